@@ -1,5 +1,6 @@
 //! Problems with recognition of objects with a place.
 
+use super::pose::Until;
 use super::stated::FARTHEST;
 use crate::calibrate::error::percent;
 use crate::error::Problem;
@@ -135,20 +136,29 @@ pub enum LocateProblem {
     },
     /// Places do not become as sure as they are to be.
     #[error(
-        "of {right} objects that were named rightly only {placed} had a place as sure as {millimeters} mm and {degrees}° within \
-         {approaches} approaches"
+        "of {right} objects that were named rightly only {placed} had a place as sure as {} mm and {}° within {approaches} approaches",
+        until.millimeters, until.degrees
     )]
     NeverPlaced {
         /// Objects that were named rightly.
         right: usize,
         /// Objects whose place became as sure.
         placed: usize,
-        /// Half of the intervals that was asked for, in millimeters.
-        millimeters: f64,
-        /// Half of the interval of the yaw, in degrees.
-        degrees: f64,
+        /// Place that was asked for.
+        until: Until,
         /// Limit of approaches.
         approaches: u32,
+    },
+    /// A test for unknown objects finds too few of them.
+    #[error(
+        "a test for unknown objects is worth little here: of {sequences} sequences of objects that were left out in turn, {unknown} \
+         ended as unknown"
+    )]
+    Untold {
+        /// Sequences.
+        sequences: usize,
+        /// Sequences that ended as unknown.
+        unknown: usize,
     },
     /// An object of the model is not on the table.
     #[error("{object} is not among the objects to calibrate on")]
@@ -198,6 +208,9 @@ impl Problem for LocateProblem {
             Self::Noise => "Use noise, timer, missed (one share for all fingers), position and drift.",
             Self::FewRecordings { .. } => {
                 "Record the objects in more places, or promise a higher error rate; more touches in the same places do not help."
+            }
+            Self::Untold { .. } => {
+                "Train maps on more approaches, of less noise or with smaller cells, or calibrate without the test."
             }
             Self::NeverPlaced { .. } => "Ask for less, such as 3 mm and 5 degrees, or allow more approaches.",
             Self::Missing { .. } | Self::Unknown { .. } => {

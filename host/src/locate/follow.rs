@@ -54,9 +54,11 @@ pub trait Locating: Send + Sync {
     fn rivals(&self) -> u64;
     /// True if the last search ended before it was done.
     fn is_exhausted(&self) -> bool;
+    /// False if no object is named, whatever its lead.
+    fn may_name(&self) -> bool;
     /// Result of the test for unknown objects.
     fn familiarity(&self) -> Familiarity;
-    /// Logarithm of the best cell's likelihood for each touch, in 1/64 nat.
+    /// How well the touches fit the leader, in 1/64 nat.
     fn fit(&self) -> i32;
     /// The most likely poses of an object, the largest share first, at most four.
     fn poses(&self, object: usize) -> Vec<Pose>;
@@ -137,6 +139,10 @@ impl<const CELLS: usize, const OBJECTS: usize> Locating for Room<'_, CELLS, OBJE
         self.locator.exhausted().is_some()
     }
 
+    fn may_name(&self) -> bool {
+        self.locator.may_name()
+    }
+
     fn familiarity(&self) -> Familiarity {
         self.locator.familiarity()
     }
@@ -205,6 +211,8 @@ pub(super) struct Pressing<'m> {
     pub(super) pose: u16,
     /// Seed of the choice of approaches.
     pub(super) seed: u32,
+    /// Weights of the objects that there may be; none: all alike.
+    pub(super) weights: Option<Vec<u32>>,
     /// Next approach; none before the first touch, and where approaches are aimed at random.
     pub(super) next: Option<Approach>,
     /// Heights that were looked up by all approaches, and at most by one.
@@ -224,6 +232,9 @@ impl Follower for Pressing<'_> {
 
     fn reset(&mut self) {
         self.locating.begin(self.seed);
+        if let Some(weights) = &self.weights {
+            self.locating.begin_of(weights);
+        }
         self.next = None;
     }
 
@@ -243,7 +254,7 @@ impl Follower for Pressing<'_> {
 
     fn rivals(&self) -> u64 {
         // No name.
-        if self.locating.is_exhausted() || self.locating.met_table_alone() { 1 << 56 } else { self.locating.rivals() }
+        if self.locating.may_name() { self.locating.rivals() } else { 1 << 56 }
     }
 
     fn familiarity(&self) -> Familiarity {

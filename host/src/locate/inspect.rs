@@ -133,6 +133,9 @@ pub struct OfPlacement<'m> {
     pub share: f64,
     /// True if it looks the same from all sides.
     pub round: bool,
+    /// Least fit of the touches at which its object is named, in nats for each touch; none without a test for unknown objects.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub least_fit: Option<f64>,
     /// Bytes of its map.
     pub bytes: usize,
 }
@@ -203,6 +206,7 @@ pub fn inspect<'m>(maps: &Maps<'m>) -> Result<Inspected<'m>> {
         placement: maps.placement_name(placement),
         share: (f64::from(maps.prior_of(placement)) / 64.0).exp(),
         round: maps.is_round(placement),
+        least_fit: maps.least_fit(placement).map(|nats| f64::from(nats) / 64.0),
         bytes: maps.bytes_of(placement),
     };
     let count = u8::try_from(maps.placements()).unwrap_or(u8::MAX);

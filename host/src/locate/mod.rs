@@ -34,7 +34,9 @@ pub use inspect::{Cost, Inspected, MapsFile, OfPlacement, Promised, hand, inspec
 pub use learn::{learn, probe_of};
 pub use palpate_onboard::locate::{Approach, Effort, Hand, Maps, POSE, Pose, Seen, TESTED};
 pub use pose::{Off, Until};
-pub use promise::{Calibrated, Evaluation, OfObject, Terms, Tested, ToPlace, calibrate, calibrate_recorded, evaluate};
+pub use promise::{
+    Calibrated, Evaluation, LeftOut, OfObject, Terms, Tested, ToPlace, calibrate, calibrate_recorded, evaluate,
+};
 pub use shape::{Relief, Sample, Shape, samples};
 pub use stated::{FARTHEST, Heights, row};
 pub use surface::Surface;
@@ -67,9 +69,6 @@ pub struct Settings {
     pub drift: f64,
     /// Standard deviation of an object's turn in an approach, in degrees.
     pub drift_yaw: f64,
-    /// Test for unknown objects: the mean logarithm of the likelihood for each touch of a known object, in 1/64 nat, and how far
-    /// below it may be after one touch. None: no test.
-    pub misfit: Option<(i16, u16)>,
     /// Factor of the half of poses' intervals, in Q8; 0: 1.
     pub stretch: u16,
     /// Posterior at which an object is named until the model is calibrated: 1 less this.
@@ -90,7 +89,6 @@ impl Default for Settings {
             table_missed: 0.02,
             drift: 0.0,
             drift_yaw: 0.0,
-            misfit: None,
             stretch: 0,
             error_rate: 0.01,
             max_touches: 25,

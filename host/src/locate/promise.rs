@@ -91,6 +91,33 @@ pub struct Calibrated {
     /// Results of going on until the place is sure; none unless that was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub until: Option<ToPlace>,
+    /// Results of the test for unknown objects; none unless that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub strangers: Option<LeftOut>,
+}
+
+/// Results of a test for unknown objects, on objects that the model is not to know: each of its own is left out in turn.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct LeftOut {
+    /// Sequences.
+    pub sequences: usize,
+    /// Sequences that ended as unknown.
+    pub unknown: usize,
+    /// Sequences that got a name, which is wrong.
+    pub named: usize,
+}
+
+impl LeftOut {
+    /// Results of sequences.
+    ///
+    /// # Errors
+    /// [`LocateProblem::Untold`], if less than half of them ended as unknown.
+    fn of(each: &[Played]) -> Result<Self, LocateProblem> {
+        let (unknown, sequences) = (each.iter().filter(|played| played.outcome.unknown).count(), each.len());
+        let named = each.iter().filter(|played| played.outcome.recognized.is_some()).count();
+        let found = Self { sequences, unknown, named };
+        if 2 * unknown < sequences { Err(LocateProblem::Untold { sequences, unknown }) } else { Ok(found) }
+    }
 }
 
 /// Results of going on until the place of a named object is sure.
@@ -105,19 +132,19 @@ pub struct ToPlace {
 }
 
 impl ToPlace {
-    /// Results of sequences of objects of these classes.
+    /// Results of sequences; none unless places were asked for.
     ///
     /// # Errors
     /// [`LocateProblem::NeverPlaced`], if less than half of the objects that were named rightly have a sure place.
-    fn of(each: &[Played], until: Until, approaches: u32) -> Result<Self, LocateProblem> {
+    fn of(each: &[Played], terms: &Terms) -> Result<Option<Self>, LocateProblem> {
+        let Some(until) = terms.until else { return Ok(None) };
         let right = each.iter().filter(|played| played.is_right).count();
         let placed = each.iter().filter(|played| played.in_intervals.is_some()).count();
         if 2 * placed < right {
-            let Until { millimeters, degrees } = until;
-            return Err(LocateProblem::NeverPlaced { right, placed, millimeters, degrees, approaches });
+            return Err(LocateProblem::NeverPlaced { right, placed, until, approaches: terms.max_touches });
         }
         let approaches: usize = each.iter().map(|played| played.outcome.approaches).sum();
-        Ok(Self { right, placed, mean_approaches: approaches as f64 / each.len().max(1) as f64 })
+        Ok(Some(Self { right, placed, mean_approaches: approaches as f64 / each.len().max(1) as f64 }))
     }
 }
 
@@ -183,8 +210,8 @@ pub struct OfObject {
 /// code: Learn-then-Test by fixed-sequence testing, as for all models. Chosen approaches depend on the follower, so they are played
 /// with it.
 ///
-/// Before, half as many other sequences say at which thresholds to begin; how unlikely touches of a known object may be, where
-/// unknown ones are to be found (1 % of them are less likely at some touch); and with [`Terms::until`] by what factor the intervals of
+/// Before, half as many other sequences say at which thresholds to begin; how badly touches may fit each known object, where
+/// unknown ones are to be found (1 % of its sequences fit worse at some touch); and with [`Terms::until`] by what factor the intervals of
 /// poses must be wider to hold 95 % of the poses at which places are sure (split conformal prediction). In the end they say how many
 /// approaches the place takes.
 ///
@@ -200,7 +227,7 @@ pub fn calibrate(
 ) -> Result<Calibrated> {
     terms.check()?;
     check_all(maps, standing.iter().map(|object| &object.name))?;
-    let plain = Restated { odds: 0, max_touches: terms.max_touches, misfit: None, stretch: 0, promise: None };
+    let plain = Restated { odds: 0, max_touches: terms.max_touches, least_fits: Vec::new(), stretch: 0, promise: None };
     let bytes = restated(maps, &plain)?;
     let plain_maps = opened(&bytes)?;
     let before = Terms { sequences: terms.sequences.div_ceil(2), seed: terms.seed.wrapping_add(1), ..*terms };
@@ -210,13 +237,12 @@ pub fn calibrate(
     // Where a test is to decide, sequences are as long as it takes.
     let least = if terms.unknown { TESTED } else { 1 };
     let goes_on = terms.unknown || terms.until.is_some();
-    let odds = odds_of(terms.promise.margin());
-    let each = if goes_on { play(plain_maps, standing, probe, &before, (odds, least), progress)? } else { Vec::new() };
-    if let Some(until) = terms.until {
-        ToPlace::of(&each, until, terms.max_touches)?;
-    }
-    let misfit = terms.unknown.then(|| misfit(&each));
-    let stated = Restated { misfit, stretch: terms.until.map_or(0, |_| stretch(&each)), ..plain };
+    let odds = odds_of(if terms.unknown { strictest(terms) } else { terms.promise.margin() });
+    let each =
+        if goes_on { play(plain_maps, standing, probe, &before, (odds, least, false), progress)? } else { Vec::new() };
+    ToPlace::of(&each, terms)?;
+    let least_fits = if terms.unknown { least_fits(&each, maps.objects()) } else { Vec::new() };
+    let stated = Restated { least_fits, stretch: terms.until.map_or(0, |_| stretch(&each)), ..plain };
     let bytes = restated(maps, &stated)?;
     let sequences = follow(opened(&bytes)?, standing, probe, terms, strictest(terms), progress)?;
     let way = Way { starts: &starts, loosest: None };
@@ -231,9 +257,14 @@ pub fn calibrate(
             problem
         })?;
     let calibrated = promised(maps, &chosen, probe, terms, stated, None)?;
-    let Some(until) = terms.until else { return Ok(calibrated) };
-    let placed = play(opened(&calibrated.model)?, standing, probe, &before, (chosen.odds.strictest(), 1), progress)?;
-    Ok(Calibrated { until: Some(ToPlace::of(&placed, until, terms.max_touches)?), ..calibrated })
+    let again = |leaves_out: bool| {
+        let how = (chosen.odds.strictest(), 1, leaves_out);
+        play(opened(&calibrated.model)?, standing, probe, &before, how, progress)
+    };
+    let until = if terms.until.is_some() { ToPlace::of(&again(false)?, terms)? } else { None };
+    let is_tested = terms.unknown && maps.objects() > 1;
+    let strangers = if is_tested { Some(LeftOut::of(&again(true)?)?) } else { None };
+    Ok(Calibrated { until, strangers, ..calibrated })
 }
 
 /// Refuses objects that are not those of the maps.
@@ -264,7 +295,7 @@ pub fn calibrate_recorded(
     terms.check()?;
     check_all(maps, recorded.objects.iter().map(|object| &object.name))?;
     let hand = Hand::of(&maps).ok_or(LocateProblem::NoHand)?;
-    let plain = Restated { odds: 0, max_touches: terms.max_touches, misfit: None, stretch: 0, promise: None };
+    let plain = Restated { odds: 0, max_touches: terms.max_touches, least_fits: Vec::new(), stretch: 0, promise: None };
     let bytes = restated(maps, &plain)?;
     let (plain_maps, names) = (opened(&bytes)?, super::names(&maps));
     // Recorded touches have noise of their own.
@@ -345,6 +376,7 @@ fn promised(
         noise: noise.to_string(),
         recordings,
         until: None,
+        strangers: None,
     })
 }
 
@@ -362,21 +394,18 @@ fn opened(bytes: &[u8]) -> Result<Maps<'_>> {
     Ok(Maps::new(bytes).map_err(|error| LocateProblem::Refused { error })?)
 }
 
-/// The mean likelihood for each touch, and how far below it all but a share of known objects stay: by a root of the number of
-/// touches, since likelihoods of touches are nearly independent.
-fn misfit(each: &[Played]) -> (i16, u16) {
-    let last: Vec<f64> = each.iter().filter_map(|played| Some(f64::from(*played.fits.last()?))).collect();
-    let mean = last.iter().sum::<f64>() / last.len().max(1) as f64;
-    let below = |played: &Played| {
-        let each =
-            (TESTED..).zip(&played.fits).map(|(touches, fit)| (mean - f64::from(*fit)) * (touches as f64).sqrt());
-        each.fold(0.0, f64::max)
+/// For each of so many objects the least fit that all but a share of its sequences keep while it leads, from where a test decides.
+fn least_fits(each: &[Played], objects: usize) -> Vec<i16> {
+    let least = |object: usize| {
+        let lowest =
+            |played: &Played| played.fits.iter().filter(|(leader, _)| *leader == object).map(|(_, fit)| *fit).min();
+        let mut all: Vec<i32> = each.iter().filter(|played| played.class == object).filter_map(lowest).collect();
+        all.sort_unstable();
+        let alarms = ((all.len() + 1) as f64 * ALARMS) as usize;
+        // 0 is no test.
+        all.get(alarms).map_or(0, |&fit| i16::try_from(fit).unwrap_or(i16::MIN).min(-1))
     };
-    let mut widths: Vec<f64> = each.iter().map(below).collect();
-    widths.sort_by(f64::total_cmp);
-    let place = ((widths.len() as f64 * (1.0 - ALARMS)).ceil() as usize).min(widths.len()).saturating_sub(1);
-    let width = widths.get(place).copied().unwrap_or(0.0);
-    ((mean.round() as i16).min(-1), width.ceil() as u16)
+    (0..objects).map(least).collect()
 }
 
 /// Distance of a pose in another placement from the truth, in units of its intervals.
@@ -419,10 +448,12 @@ fn follow(
 #[derive(Clone, Debug)]
 struct Played {
     outcome: Outcome,
+    /// The object's number in the model.
+    class: usize,
     /// True if its name is right.
     is_right: bool,
-    /// Likelihoods of the best cell for each touch, from where a test decides.
-    fits: Vec<i32>,
+    /// The leader and its fit until there is a name, from where a test decides.
+    fits: Vec<(usize, i32)>,
     /// Distance of the pose from the truth; none if the object lies in another way, no name was given, or it has no sure pose.
     off: Option<Off>,
     /// This distance in units of the pose's intervals, of the closest mode where there are several; none unless the name is right
@@ -431,13 +462,14 @@ struct Played {
     looked: [u64; 2],
 }
 
-/// Plays sequences until a name is sure, and with [`Terms::until`] until the pose of the named object is.
+/// Plays sequences until a name is sure from so many touches on, and with [`Terms::until`] until the pose of the named object is; each
+/// as of an object that there cannot be, if its own is left out.
 fn play(
     maps: Maps<'_>,
     standing: &[Standing],
     probe: &Probe,
     terms: &Terms,
-    (odds, least): (u64, usize),
+    (odds, least, leaves_out): (u64, usize, bool),
     progress: &dyn Progress,
 ) -> Result<Vec<Played>> {
     terms.check()?;
@@ -447,14 +479,17 @@ fn play(
     let of = |index: usize| -> Result<Played> {
         progress::advance(progress, 1)?;
         let (mut pressed, mut pressing) = setup.sequence(index as u64);
+        if leaves_out {
+            pressing.weights = Some((0..maps.objects()).map(|object| u32::from(object != pressed.class)).collect());
+        }
         let (mut outcome, mut fits, mut modes, mut is_placed) = (Outcome::default(), Vec::new(), Vec::new(), false);
         let Ok(_) = evidence::follow(&mut pressed, &mut pressing, |follower, counted| {
             (outcome.touches, outcome.approaches) = (counted.touches as usize, counted.approaches as usize);
             if outcome.recognized.is_none() {
                 let familiarity = follower.familiarity();
                 outcome.unknown = familiarity == Familiarity::Stranger;
-                if counted.touches as usize >= TESTED {
-                    fits.push(follower.locating.fit());
+                if counted.touches as usize >= TESTED && follower.locating.may_name() {
+                    fits.push((follower.leader(), follower.locating.fit()));
                 }
                 let may_name = familiarity == Familiarity::Known && counted.touches as usize >= least;
                 outcome.recognized = (may_name && follower.rivals() <= odds).then(|| follower.leader());
@@ -474,7 +509,7 @@ fn play(
         modes.truncate(terms.until.map_or(usize::MAX, |_| 1));
         let parts = modes.iter().filter_map(|pose| Some(equivalents.off(&pressed.before, pose)?.in_intervals(pose)));
         let in_intervals = (is_right && is_placed).then(|| parts.fold(ELSEWHERE, f64::min));
-        Ok(Played { outcome, is_right, fits, off, in_intervals, looked: pressing.looked })
+        Ok(Played { outcome, class: pressed.class, is_right, fits, off, in_intervals, looked: pressing.looked })
     };
     (0..terms.sequences).into_par_iter().map(of).collect()
 }
@@ -490,7 +525,7 @@ pub fn evaluate(
     terms: &Terms,
     progress: &dyn Progress,
 ) -> Result<Evaluation> {
-    let each = play(maps, standing, probe, terms, (maps.stopping().odds(), 1), progress)?;
+    let each = play(maps, standing, probe, terms, (maps.stopping().odds(), 1, false), progress)?;
     let class_of = classes(maps, standing);
     let number = |index: usize| index % standing.len().max(1);
     let outcome = |(index, played): (usize, &Played)| (class_of[number(index)], played.outcome);
@@ -586,7 +621,7 @@ fn pressing<'m>(
     seed: u32,
 ) -> Pressing<'m> {
     let locating = locating(maps, Stopping::from_odds(0, u32::MAX), effort);
-    Pressing { locating, hand, within, aimed, pose, seed, next: None, looked: [0, 0] }
+    Pressing { locating, hand, within, aimed, pose, seed, weights: None, next: None, looked: [0, 0] }
 }
 
 /// Half of the square about the believed place in which approaches are aimed at random, in millimeters.

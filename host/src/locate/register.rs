@@ -138,8 +138,7 @@ fn follow(
         noise = settings.noise.max(1.0),
         position = settings.position.max(1.0),
         outliers = 1e-3,
-        range = NEAR,
-        misfit = None
+        range = NEAR
     );
     let surface = guessed(relief, settings.cell());
     let model = write(&[surface], &["object".into()], probe, &settings).ok()?;

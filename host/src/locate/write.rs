@@ -6,7 +6,7 @@ use super::surface::Surface;
 use crate::compile::{OwnedSection, file};
 use crate::error::Result;
 use crate::probe::approach::Probe;
-use palpate_onboard::locate::{BEYOND, DISTANCES, Maps, WIDTHS, WITHIN};
+use palpate_onboard::locate::{BEYOND, DISTANCES, MAPS_LENGTH, Maps, PLACEMENT_LENGTH, WIDTHS, WITHIN};
 use palpate_shared::format::{
     HEADER_LENGTH, Header, HeaderBuilder, Length, MAPS_LAYOUT, Promise, Section, Tag, TrainedProbe, take_section,
 };
@@ -63,7 +63,9 @@ pub fn write(surfaces: &[Surface], objects: &[String], probe: &Probe, settings: 
     content.extend(number(settings.range * SIXTEENTHS, 4_096));
     content.extend(number(settings.drift * SIXTEENTHS, 1_023));
     content.extend(number(settings.drift_yaw.to_radians() * 16_384.0, 1_023));
-    content.extend(tests(settings.misfit, settings.stretch));
+    content.extend([0; 2]);
+    content.extend(settings.stretch.to_le_bytes());
+    content.extend([0; 2]);
     content.extend([settings.noise, settings.position].map(|length| (length * 50.0).round() as u8));
     content.extend(number(settings.lost * 1e4, 10_000));
     content.extend(records);
@@ -101,12 +103,12 @@ pub fn write(surfaces: &[Surface], objects: &[String], probe: &Probe, settings: 
 }
 
 /// Statement of a calibration.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Restated {
     pub(super) odds: u64,
     pub(super) max_touches: u32,
-    /// See [`Settings::misfit`].
-    pub(super) misfit: Option<(i16, u16)>,
+    /// Least fit of each object, in 1/64 nat, as a test for unknown objects; none: no test.
+    pub(super) least_fits: Vec<i16>,
     /// See [`Settings::stretch`].
     pub(super) stretch: u16,
     pub(super) promise: Option<Promise>,
@@ -117,7 +119,7 @@ pub(super) struct Restated {
 /// # Errors
 /// [`LocateProblem::Refused`] if it could not be read then.
 pub(super) fn restated(maps: Maps<'_>, stated: &Restated) -> Result<Vec<u8>> {
-    let Restated { odds, max_touches, misfit, stretch, promise } = *stated;
+    let &Restated { odds, max_touches, ref least_fits, stretch, promise } = stated;
     let header = Header::of(maps.model());
     let length = |length: u32| usize::try_from(length).unwrap_or(usize::MAX);
     let rest = &maps.model()[HEADER_LENGTH..];
@@ -127,7 +129,11 @@ pub(super) fn restated(maps: Maps<'_>, stated: &Restated) -> Result<Vec<u8>> {
     while let Some(Section { tag, must_understand, content }) = take_section(&mut own) {
         let mut content = content.to_vec();
         if tag == Tag::Maps.code() {
-            content[MISFIT..MISFIT + 6].copy_from_slice(&tests(misfit, stretch));
+            content[STRETCH..STRETCH + 2].copy_from_slice(&stretch.to_le_bytes());
+            for record in content[MAPS_LENGTH..].chunks_exact_mut(PLACEMENT_LENGTH).take(maps.placements()) {
+                let least = least_fits.get(usize::from(record[0])).copied().unwrap_or(0);
+                record[PLACEMENT_LENGTH - 2..].copy_from_slice(&least.to_le_bytes());
+            }
         }
         if tag != Tag::Promise.code() {
             sections.push(OwnedSection { tag, must_understand, content });
@@ -142,14 +148,8 @@ pub(super) fn restated(maps: Maps<'_>, stated: &Restated) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// The bytes of a test for unknown objects, and of the factor of intervals.
-fn tests(misfit: Option<(i16, u16)>, stretch: u16) -> Vec<u8> {
-    let (mean, width) = misfit.unwrap_or_default();
-    [mean.to_le_bytes(), stretch.to_le_bytes(), width.to_le_bytes()].concat()
-}
-
-/// Place of the misfit in a section of maps.
-const MISFIT: usize = 10;
+/// Place of the factor of intervals in a section of maps.
+const STRETCH: usize = 12;
 
 /// Writes a surface's heights, cells first and then the windows' minima and maxima, and returns how many cells each level has on
 /// each side of its middle.

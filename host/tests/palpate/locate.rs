@@ -170,36 +170,33 @@ fn a_hand_that_may_not_leave_the_middle_aims_otherwise_chosen_or_at_random() {
 }
 
 #[test]
-fn intervals_of_poses_change_only_where_a_promise_is_for_poses() {
+fn intervals_of_poses_and_approaches_until_them_are_of_a_calibration_for_places() {
     let within = |bytes: &[u8]| {
         let maps = Maps::new(bytes).unwrap();
         let mut locating = locating(maps, maps.stopping(), None);
         locating.push(Seen::new([0, 0], [15_000, 0], [Contact::At(20_000); 3], 0));
         locating.poses(0)[0].within
     };
-    let calibrated = |until| {
-        let terms = Terms { until, ..terms(40) };
-        calibrate(Maps::new(&MODEL).unwrap(), &STANDING, &probe(), &terms, &()).unwrap().model
+    let calibrated = |until, sequences| {
+        let terms = Terms { until, ..terms(sequences) };
+        calibrate(Maps::new(&MODEL).unwrap(), &STANDING, &probe(), &terms, &()).unwrap()
     };
     // A name is sure long before its pose: intervals that held 95 % of such poses would be as wide as the table.
-    assert_eq!(within(&calibrated(None)), within(&MODEL));
-    assert_ne!(within(&calibrated(Some(Until { millimeters: 4.0, degrees: 8.0 }))), within(&MODEL));
+    let named = calibrated(None, 40);
+    assert_eq!(within(&named.model), within(&MODEL));
+    let placed = calibrated(Some(Until { millimeters: 20.0, degrees: 90.0 }), 60);
+    assert_ne!(within(&placed.model), within(&MODEL));
+    // Approaches until the place are stated, too.
+    let until = placed.until.unwrap();
+    assert!(until.right >= 20 && until.placed * 2 >= until.right, "{until:?}");
+    assert!(named.until.is_none() && until.mean_approaches > placed.mean_approaches - 0.5, "{until:?}");
 }
 
 #[test]
-fn a_calibration_for_places_states_approaches_until_the_place_and_refuses_what_is_never_met() {
-    let calibrated = |millimeters, degrees| {
-        let until = Some(Until { millimeters, degrees });
-        calibrate(Maps::new(&MODEL).unwrap(), &STANDING, &probe(), &Terms { until, ..terms(40) }, &())
-    };
-    let found = calibrated(4.0, 8.0).unwrap();
-    let to_place = found.until.unwrap();
-    assert!(to_place.right >= 15 && to_place.placed * 10 >= to_place.right * 8, "{to_place:?}");
-    assert!(to_place.mean_approaches > found.mean_approaches, "{to_place:?}, {}", found.mean_approaches);
-    let error = calibrated(0.5, 0.5).unwrap_err().to_string();
+fn places_that_are_never_as_sure_as_asked_for_are_refused() {
+    let terms = Terms { until: Some(Until { millimeters: 0.5, degrees: 0.5 }), ..terms(20) };
+    let error = calibrate(Maps::new(&MODEL).unwrap(), &STANDING, &probe(), &terms, &()).unwrap_err().to_string();
     assert!(error.contains("only 0 had a place as sure as 0.5 mm and 0.5° within 20 approaches"), "{error}");
-    let plain = calibrate(Maps::new(&MODEL).unwrap(), &STANDING, &probe(), &terms(40), &()).unwrap();
-    assert!(plain.until.is_none());
 }
 
 #[test]

@@ -34,7 +34,8 @@ impl Maps<'_> {
         quotient(self.range, i32::from(self.roots) << level)
     }
 
-    /// Likelihood of a cell given the touches, the last first; less than `least` may be of some of them alone.
+    /// Likelihood of a cell given the touches, the last first, and given in each interval the height that fits best, beginning with
+    /// these; less than `least` may be of some of them alone.
     #[inline(always)]
     fn likely(
         &self,
@@ -44,7 +45,7 @@ impl Maps<'_> {
         seen: &[Seen],
         least: i32,
         looked: &mut u32,
-    ) -> i32 {
+    ) -> [i32; 2] {
         let (level, is_finest) = (i32::from(cell.level), cell.level >= FINEST);
         let (cos, sin) = direction(turn(cell.yaw, cell.level));
         let (x, y) = (self.middle(cell.x, cell.level), self.middle(cell.y, cell.level));
@@ -77,9 +78,7 @@ impl Maps<'_> {
                 break;
             }
         }
-        // The best height in each interval bounds a cell that is split. In a finest cell it would fit objects with many edges to
-        // anything, more so with each touch.
-        if is_finest { whole } else { whole.max(finest) }.clamp(NOTHING, -NOTHING)
+        [whole, finest].map(|likely| likely.clamp(NOTHING, -NOTHING))
     }
 
     /// Likelihood of a finger's height given an interval, and given the height in it that fits best.
@@ -139,6 +138,42 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize, P: Pool> Lo
         usize::from(self.maps.object_of(cell.placement))
     }
 
+    /// The most likely cell of the leader; none if it has none in the pool.
+    fn most_likely(&self) -> Option<&Cell> {
+        let leader = self.leader();
+        self.cells().iter().filter(|cell| self.object_of(cell) == leader).max_by_key(|cell| cell.likely)
+    }
+
+    /// Least [fit](Self::fit) of a known object that leads; none without a test for unknown objects.
+    pub(super) fn least_fit(&self) -> Option<i32> {
+        self.maps.least_fit(self.most_likely()?.placement)
+    }
+
+    /// How well the touches fit the leader's most likely cell: the logarithm of their likelihood for each touch, in 1/64 nat, given in
+    /// each cell's interval of heights the one that fits best. Cost: a pass over the kept cells, a few instructions for each, and
+    /// three lookups of heights for each touch. Cannot fail.
+    pub fn fit(&self) -> i32 {
+        let Some(best) = self.most_likely() else { return NOTHING };
+        let seen = self.seen.get(..self.touches).unwrap_or_default();
+        let [_, finest] = self.maps.likely(best, &self.maps.placement(best.placement), [0; 2], seen, i32::MIN, &mut 0);
+        finest.checked_div(i32::try_from(self.touches).unwrap_or(1)).unwrap_or(0)
+    }
+
+    /// True if half of the leader's kept cells, by their weight, are outermost in the square in which objects are looked for: it may be
+    /// something that lies outside. Also true without any such cell. Cost: a pass over the kept cells. Cannot fail.
+    pub fn is_at_border(&self) -> bool {
+        let leader = self.leader();
+        let (mut all, mut outermost) = (0_u64, 0_u64);
+        for cell in self.cells().iter().filter(|cell| self.object_of(cell) == leader) {
+            let weight = u64::from(self.weight(cell));
+            let last = (u32::from(self.maps.roots) << cell.level).saturating_sub(1);
+            let is_outermost = [cell.x, cell.y].iter().any(|&place| place == 0 || u32::from(place) == last);
+            all += weight;
+            outermost += if is_outermost { weight } else { 0 };
+        }
+        2 * outermost >= all
+    }
+
     /// Logarithm of a cell's share before the first touch.
     pub(super) fn prior(&self, index: u8, placement: &Placement, level: u8) -> i32 {
         let parts = if placement.is_round { ROUND_PARTS } else { PARTS };
@@ -168,7 +203,10 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize, P: Pool> Lo
     fn likely(&mut self, cell: &Cell, placement: &Placement, least: i32) -> i32 {
         let seen = self.seen.get(..self.touches).unwrap_or_default();
         let priors = [cell.level, FINEST].map(|level| self.prior(cell.placement, placement, level));
-        self.maps.likely(cell, placement, priors, seen, least, &mut self.looked)
+        let [whole, finest] = self.maps.likely(cell, placement, priors, seen, least, &mut self.looked);
+        // The best height in each interval bounds a cell that is split. In a finest cell it would fit objects with many edges to
+        // anything, more so with each touch.
+        if cell.level >= FINEST { whole } else { whole.max(finest) }
     }
 
     /// Puts a cell into the pool, which has room, or drops it.

@@ -1,7 +1,6 @@
 //! Cells of (placement, yaw, x, y), and bounds on them.
 
 use super::number::quotient;
-use crate::bytes::at;
 
 /// Most touches that a locator has room for.
 pub(super) const MOST_TOUCHES: usize = 64;
@@ -44,10 +43,6 @@ pub(super) const ROOTS: [i32; MOST_TOUCHES] = {
     }
     roots
 };
-/// Root of a number of touches in Q4.
-pub(super) fn root(touches: usize) -> i32 {
-    at(&ROOTS, touches.min(MOST_TOUCHES - 1))
-}
 
 /// Heights below this may be of the table after a contact was lost, in 1/16 mm.
 pub(super) const NEAR: i32 = 24;

@@ -1,6 +1,6 @@
 //! The follower: touches in, a verdict out.
 
-use super::cell::{Cell, FINEST, MOST_TOUCHES, NEAR, Pool};
+use super::cell::{Cell, MOST_TOUCHES, NEAR, Pool};
 use super::maps::Maps;
 use super::number::{NOTHING, Random, add, logarithm, odds};
 use super::seen::{Contact, Seen};
@@ -198,7 +198,7 @@ impl<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize, P: Pool
     /// the object's place go on with further touches.
     ///
     /// Cost: a search, about as much as [`Effort::lookups`] says. Until there is a verdict also a pass over the objects and one over
-    /// the touches, and one over the kept cells where the maps have a test for unknown objects. Cannot fail: once there is no more
+    /// the touches, and a few over the kept cells. Cannot fail: once there is no more
     /// room for touches, the verdict is [`Verdict::GaveUp`] unless there was another.
     pub fn push_seen(&mut self, seen: Seen) -> Verdict {
         if let Some(slot) = self.seen.get_mut(self.touches) {
@@ -225,15 +225,20 @@ impl<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize, P: Pool
         }
     }
 
-    /// A verdict on the last search alone. No object is named before a finger met more than the table: on an empty table the object
-    /// that is easiest to miss would be.
+    /// False if no object is named, whatever its lead: after a search that was not finished, before a finger met more than the table
+    /// (on an empty table the object that is easiest to miss would be named), and while the place is at the [border](Self::is_at_border).
+    ///
+    /// Cost: a pass over the touches and one over the kept cells. Cannot fail.
+    pub fn may_name(&self) -> bool {
+        self.exhausted.is_none() && !self.met_table_alone() && !self.is_at_border()
+    }
+
+    /// A verdict on the last search alone.
     fn decide(&self) -> Verdict {
         let touches = u32::try_from(self.touches).unwrap_or(u32::MAX);
         let familiarity = self.familiarity();
-        let is_sure = familiarity == Familiarity::Known
-            && self.exhausted.is_none()
-            && !self.met_table_alone()
-            && self.rivals().q56() <= self.stopping.odds();
+        let is_sure =
+            familiarity == Familiarity::Known && self.may_name() && self.rivals().q56() <= self.stopping.odds();
         if familiarity == Familiarity::Stranger {
             Verdict::Unknown
         } else if is_sure {
@@ -268,22 +273,14 @@ impl<'m, const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize, P: Pool
     }
 
     /// Result of the test of whether the touches fit an object at all, for maps that state one: doubtful before the eighth touch,
-    /// and then by how likely the most likely cell is. No object is named while it is not known.
+    /// and then by the [fit](Self::fit) of the leader. No object is named while it is not known.
     pub fn familiarity(&self) -> Familiarity {
-        match self.maps.misfit(self.touches) {
+        match self.least_fit() {
             None => Familiarity::Known,
             Some(_) if self.touches < TESTED => Familiarity::Doubtful,
-            Some(limit) if self.fit() < limit => Familiarity::Stranger,
+            Some(least) if self.fit() < least => Familiarity::Stranger,
             Some(_) => Familiarity::Known,
         }
-    }
-
-    /// Logarithm of the likelihood of the most likely cell for each touch, in 1/64 nat. Cost: a pass over the kept cells, a few
-    /// instructions for each.
-    pub fn fit(&self) -> i32 {
-        let best = self.cells().iter().max_by_key(|cell| cell.likely);
-        let prior = best.map_or(0, |cell| self.prior(cell.placement, &self.maps.placement(cell.placement), FINEST));
-        (self.best - prior).checked_div(i32::try_from(self.touches).unwrap_or(1)).unwrap_or(0)
     }
 
     /// True if no finger of any touch so far met more than the table, within 1.5 mm: after a verdict without a name there is

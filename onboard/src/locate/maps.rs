@@ -1,6 +1,5 @@
 //! Height maps of placements, read in place.
 
-use super::cell::root;
 use crate::bytes::{ModelError, at};
 use crate::decide::Stopping;
 use palpate_shared::format::{
@@ -42,10 +41,6 @@ pub struct Maps<'a> {
     pub(super) roots: u8,
     /// Standard deviation of an object's move in an approach, in 1/16 mm, and of its turn, in radians in Q14.
     pub(super) drift: [i32; 2],
-    /// Mean logarithm of the likelihood for each touch of a known object, in 1/64 nat; 0: no test for unknown ones.
-    misfit: i16,
-    /// Distance below it that a known object's may have after one touch; divided by the root of n after n touches.
-    misfit_width: u16,
     /// Factor of the half of a pose's intervals, in Q8; 0: 1.
     stretch: u16,
 }
@@ -57,6 +52,8 @@ pub(super) struct Placement {
     pub(super) is_round: bool,
     /// Logarithm of its share of its object.
     pub(super) prior: i32,
+    /// Least fit of its object, in 1/64 nat; 0: no test for unknown ones.
+    least_fit: i32,
     /// 1/16 mm in a count of its heights, in Q6.
     scale: u32,
     /// Farthest point that is higher than the table, from the origin, in 1/16 mm.
@@ -89,8 +86,6 @@ impl<'a> Maps<'a> {
         range: 0,
         roots: 0,
         drift: [0; 2],
-        misfit: 0,
-        misfit_width: 0,
         stretch: 0,
     };
 
@@ -138,7 +133,7 @@ impl<'a> Maps<'a> {
         let (fixed, rest) = content.split_first_chunk::<MAPS_LENGTH>()?;
         let &[shift, roots, placements, _, ref range @ ..] = fixed;
         let (numbers, _) = range.as_chunks::<2>();
-        let &[range, drift, turn, misfit, stretch, width, ..] = numbers else { return None };
+        let &[range, drift, turn, _, stretch, ..] = numbers else { return None };
         let (records, rest) = rest.split_at_checked(usize::from(placements) * PLACEMENT_LENGTH)?;
         let (likelihoods, heights) = rest.split_at_checked(LIKELIHOODS_LENGTH)?;
         let range = i32::from(u16::from_le_bytes(range));
@@ -150,8 +145,6 @@ impl<'a> Maps<'a> {
             is_fine: shift == 4,
             range,
             roots,
-            misfit: i16::from_le_bytes(misfit),
-            misfit_width: u16::from_le_bytes(width),
             stretch: u16::from_le_bytes(stretch),
             drift: [drift, turn].map(|bytes| i32::from(u16::from_le_bytes(bytes))),
         };
@@ -276,11 +269,9 @@ impl<'a> Maps<'a> {
         if self.is_fine { 1 } else { 2 }
     }
 
-    /// Logarithm of the likelihood for each touch, in 1/64 nat, below which an object is unknown after so many touches; none
-    /// without a test for unknown objects.
-    pub(super) fn misfit(&self, touches: usize) -> Option<i32> {
-        let root = root(touches).max(1);
-        (self.misfit != 0).then(|| i32::from(self.misfit) - (i32::from(self.misfit_width) << 4) / root)
+    /// Least [fit](super::Locator::fit) of a placement's object, in 1/64 nat; none without a test for unknown objects.
+    pub fn least_fit(&self, placement: u8) -> Option<i32> {
+        Some(self.placement(placement).least_fit).filter(|&least| least != 0)
     }
 
     /// Thresholds that the model states.
@@ -317,13 +308,14 @@ impl<'a> Maps<'a> {
     pub(super) fn placement(&self, index: u8) -> Placement {
         let start = usize::from(index) * PLACEMENT_LENGTH;
         let record = self.records.get(start..).and_then(<[u8]>::first_chunk::<PLACEMENT_LENGTH>);
-        let Some(&[object, flags, p0, p1, s0, s1, r0, r1, o0, o1, o2, o3, halves @ ..]) = record else {
+        let Some(&[object, flags, p0, p1, s0, s1, r0, r1, o0, o1, o2, o3, ref halves @ .., f0, f1]) = record else {
             return Placement::default();
         };
         let mut placement = Placement {
             object,
             is_round: flags & 1 != 0,
             prior: i32::from(i16::from_le_bytes([p0, p1])),
+            least_fit: i32::from(i16::from_le_bytes([f0, f1])),
             scale: u32::from(u16::from_le_bytes([s0, s1])),
             radius: i32::from(u16::from_le_bytes([r0, r1])),
             half: [[0; 2]; LEVELS],

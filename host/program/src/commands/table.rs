@@ -11,7 +11,8 @@ use palpate::ensemble::StatedProbe;
 use palpate::error::LocateProblem;
 use palpate::evaluate::Finding;
 use palpate::locate::{
-    self, Aimed, Calibrated, Evaluation, Inspected, MapsFile, POSE, Promised, Real, Standing, Terms, ToPlace, Until,
+    self, Aimed, Calibrated, Evaluation, Inspected, LeftOut, MapsFile, POSE, Promised, Real, Standing, Terms, ToPlace,
+    Until,
 };
 use palpate::output;
 use palpate::probe::Probe;
@@ -211,6 +212,12 @@ fn calibrated_text(path: &Path, calibrated: &Calibrated, before: u64) -> String 
             let approaches = decimal(mean_approaches, 1);
             format!("Until the place is sure: {approaches} approaches each; {placed} of {right} objects named rightly had a sure place.\n")
         })
+        + &calibrated.strangers.map_or_else(String::new, |LeftOut { sequences, unknown, named }| {
+            format!(
+                "Test for unknown objects, with each object left out in turn: {unknown} of {sequences} sequences ended as unknown, \
+                 {named} with a name.\n"
+            )
+        })
         + calibrated.recordings.map_or("", |_| note)
         + &super::thresholds::text(&margins, &Default::default(), calibrate::margin_of(before))
         + &format!("{}: {} bytes\n", path.display(), count(calibrated.model.len()))
@@ -293,9 +300,14 @@ fn inspected_text(inspected: &Inspected<'_>) -> String {
     let width = inspected.placements.iter().map(|of| named(of).chars().count()).max().unwrap_or(0);
     for of in &inspected.placements {
         let round = if of.round { ", round" } else { "" };
+        let least =
+            of.least_fit.map_or_else(String::new, |least| format!(", unknown below {} nats", decimal(least, 2)));
         let (share, bytes) = (percent(of.share, 0), count(of.bytes));
-        line("", format!("{:width$} {share:>6} {bytes:>8} bytes{round}", named(of)));
+        line("", format!("{:width$} {share:>6} {bytes:>8} bytes{round}{least}", named(of)));
     }
+    let has_test = inspected.placements.iter().any(|of| of.least_fit.is_some());
+    let test = if has_test { "from the eighth approach on, by the nats for each touch above" } else { "none" };
+    line("unknown test", test.into());
     line("range", format!("places within {} mm of the table's origin, along x and y", inspected.range));
     let Probe { radius, spacing, speed, stroke, .. } = inspected.probe;
     let stroke = stroke.map_or("to the table".into(), |stroke| format!("stroke {stroke} mm"));

@@ -34,11 +34,19 @@ fn objects_are_located_with_maps_from_a_capture_to_a_verdict() {
     assert_eq!(inspected["placements"].as_array().unwrap().len(), placements.len());
     assert_eq!((inspected["cell"].as_u64(), inspected["range"].as_f64()), (Some(2), Some(20.0)));
     assert!(inspected["promise"].is_null() && inspected["approach"]["ram"].as_u64().unwrap() > 100_000);
-    says(at, "inspect maps.palpate", &["brick/", "noise of 5 ms, 2 % of contacts missed"]);
+    says(at, "inspect maps.palpate", &["brick/", "noise of 5 ms, 2 % of contacts missed", "unknown test   none"]);
 
     let words = "calibrate maps.palpate --objects meshes --true-size mm --error-rate 40% --sequences 20";
     let said = succeeds(at, &format!("{words} -o sure.palpate"));
     assert!(said.contains("It holds for chosen approaches, for noise of 5 ms, 2 % of contacts missed"), "{said}");
+    assert!(!said.contains("Until the place is sure"), "{said}");
+    let placed = figures(at, &format!("{words} -o placed.palpate --until 25mm/90deg"));
+    let approaches =
+        [&placed["mean_approaches"], &placed["until"]["mean_approaches"]].map(|mean| mean.as_f64().unwrap());
+    assert!(approaches[0] < approaches[1] + 0.5, "{placed}");
+    let never = "only 0 had a place as sure as 0.1 mm and 1° within 25 approaches. Ask for less";
+    fails(at, &format!("{words} -o never.palpate --until 0.1mm/1deg"), 1, never);
+    assert!(!at.join("never.palpate").exists());
     let noise = "--real none,noise=2ms,drift=1mm/1deg";
     let random = figures(at, &format!("{words} -o random.palpate --aimed random {noise}"));
     assert_eq!(random["aimed"], "random");
@@ -84,7 +92,9 @@ fn each_touch_gives_a_verdict_a_place_and_the_next_approach_until_an_object_is_n
 fn on_an_empty_table_it_is_said_that_nothing_but_the_table_was_met() {
     let at = &LOCATED.folder();
     let calibrate = "calibrate maps.palpate --objects meshes --true-size mm --error-rate 40% --sequences 20";
-    succeeds(at, &format!("{calibrate} --detect-unknown -o sure.palpate"));
+    let said = succeeds(at, &format!("{calibrate} --detect-unknown -o sure.palpate"));
+    assert!(said.contains("with each object left out in turn: "), "{said}");
+    says(at, "inspect sure.palpate", &["unknown below ", "unknown test   from the eighth approach on"]);
     // All over the table, with the row along x.
     let press = |number: i32| {
         let (x, y) = (number % 5 * 15 - 30, number / 5 * 12 - 24);
