@@ -188,7 +188,7 @@ fn header(put: Put<'_>) {
     at("a unit that is too coarse", 32, &1.0_f32.to_le_bytes());
     at("a unit that is not a number", 32, &f32::NAN.to_le_bytes());
     at("a negative unit", 32, &(-0.01_f32).to_le_bytes());
-    at("a unit of evidence without its highest bit", 39, &[good[39] & 0x7f]);
+    at("a unit of evidence without its highest bit", 36, &[good[36], good[37], good[38], good[39] & 0x7f]);
     at("a unit shift beyond 23", 40, &[24]);
     at("a threshold that a tie passes", 48, &(1_u64 << 56).to_le_bytes());
     at("no touch at all", 56, &[0; 4]);

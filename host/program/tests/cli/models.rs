@@ -231,7 +231,7 @@ fn a_calibrated_model_promises_in_all_or_by_name_and_evaluate_shows_whether_it_k
     says(at, &evaluate, &["the promise is broken by ", "void: promised with no noise"]);
     // Thresholds by name are stated for each and evaluated for each.
     let per = "calibrate model.palpate fresh -o names.palpate --error-rate 0.1 --per name";
-    says(at, per, &["each name, when it is given"]);
+    says(at, per, &["Each name is wrong at most 10 % of the times that it is given."]);
     assert_eq!(figures(at, "inspect names.palpate")["promise"]["per"], "name");
     let evaluated = figures(at, "evaluate names.palpate unseen");
     assert_eq!(evaluated["sequential"]["per"], "name");

@@ -68,7 +68,7 @@ pub use emit::{HEADER, Language, NO_CODE, check_place, emit, identifier, write_s
 pub use error::CompileProblem;
 pub use legend::label_numbers;
 pub(crate) use merge::Source;
-pub use model::{CompiledModel, names, open, thresholds};
+pub use model::{CompiledModel, bound_of, names, open, thresholds};
 pub use palpate_shared::format::{Layout, LeafType as Leaf};
 pub use restate::{Restated, RestatedSection, restate};
 pub use share::different_leaves;

@@ -1,8 +1,7 @@
 //! Notes on how close a regression's values are to the library's.
 
-use super::Leaf;
+use super::{Leaf, bound_of};
 use crate::ensemble::{Ensemble, TOLERATED};
-use crate::verify;
 use palpate_onboard::Model;
 
 /// Notes for the user, where the bound that a model states, or a step of f32, is not small against what the trees add up to.
@@ -18,7 +17,7 @@ pub(super) fn of_values(ensemble: &Ensemble, model: &Model<'_>, leaf: Leaf, erro
         // Values of f32 leaves are their sums, which nothing rounds further.
         let bound = match leaf {
             Leaf::F32 => errors[0] * f64::from(model.prediction().scale),
-            Leaf::I8 | Leaf::I16 => verify::bound_of(model, output),
+            Leaf::I8 | Leaf::I16 => bound_of(model, output),
         };
         if bound > TOLERATED * reach {
             let is_librarys = leaf != Leaf::F32 && ensemble.adds_f32() && errors[0] > errors[1];

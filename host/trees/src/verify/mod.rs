@@ -13,9 +13,10 @@ mod values;
 pub use crate::rows::ClassDiffers;
 pub use candidate::Candidate;
 pub use estimate::Estimate;
-pub use reference::{bound, bound_of, margins, unit};
+pub use reference::{bound, margins, unit};
 pub use score::{Classes, Regression, RowsEvaluation, evaluate_rows};
 
+use crate::compile::bound_of;
 use crate::ensemble::{Ensemble, Threshold};
 use crate::error::{Result, RowsProblem};
 use crate::rows::{Encoder, Rows, ValueDiffers, generate, missing_text};

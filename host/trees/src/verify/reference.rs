@@ -165,9 +165,3 @@ pub(super) fn scales(model: &Model<'_>) -> Vec<[f64; 2]> {
 pub fn bound(model: &Model<'_>) -> f64 {
     f64::from(model.margin_error()) * f64::from(model.prediction().scale)
 }
-
-/// The farthest that an output's margin can be from the library's own.
-pub fn bound_of(model: &Model<'_>, output: usize) -> f64 {
-    let scale = model.output_scale(output).map_or(model.prediction().scale, |own| own.scale);
-    f64::from(model.margin_error()) * f64::from(scale)
-}

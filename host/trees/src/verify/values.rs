@@ -1,6 +1,7 @@
 //! A model's classes and values compared with the output of the library's own `predict`.
 
-use super::reference::{Reference, Rounding, bound_of, margins};
+use super::reference::{Reference, Rounding, margins};
+use crate::compile::bound_of;
 use crate::ensemble::TOLERATED;
 use crate::error::{Result, RowsProblem};
 use crate::rows::{ClassDiffers, Rows, ValueDiffers, class};

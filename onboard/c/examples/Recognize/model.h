@@ -67,7 +67,7 @@ static const uint8_t model_model[173]
 static const palpate_model model_opened_ = {
     model_model,
     {model_model + 96, model_model + 107, model_model + 107, model_model + 123, model_model + 138, model_model + 146, model_model + 159, model_model + 169},
-    model_model + 131, NULL, NULL, NULL, NULL, NULL, NULL, 0, 0u,
+    model_model + 131, NULL, NULL, NULL, NULL, NULL,
 #if PALPATE_SEQUENCES
     NULL, NULL,
 #endif
