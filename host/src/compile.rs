@@ -2,7 +2,9 @@
 
 pub use palpate_trees::compile::*;
 
-use crate::ensemble::{Ensemble, OverTouches, TouchOrigin, train};
+#[cfg(feature = "train")]
+use crate::ensemble::train;
+use crate::ensemble::{Ensemble, OverTouches, TouchOrigin};
 use crate::error::{Error, Result};
 use crate::touches::Longest;
 use crate::with;
@@ -12,11 +14,13 @@ use palpate_trees::compile as trees;
 
 /// Models of more objects than this are usually compiled with leaves of one byte: `docs/measurements/growth.md`
 /// has what that saves and what it costs.
+#[cfg(feature = "train")]
 const MANY: usize = 50;
 
 /// The settings that an ensemble is compiled with unless others are asked for. Over touches leaves have one byte where they
 /// were rounded to it, so that two would hold nothing more, and for more than 50 objects, where nearly all of a model is
 /// leaves; all others have two.
+#[cfg(feature = "train")]
 pub fn usual(ensemble: &Ensemble) -> Settings {
     let is_small = || ensemble.objects.len() > MANY || train::is_rounded(ensemble, 8);
     let leaf = if ensemble.schema().is_some() && is_small() { Leaf::I8 } else { Leaf::I16 };
