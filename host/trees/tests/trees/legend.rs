@@ -96,7 +96,7 @@ fn hard_names_of_features_and_classes_become_comments_and_constants_that_compile
         }
         put("m.h", &header);
         // Every constant is what the model predicts for its row.
-        let mut calls = format!("    float row[M_FEATURES] = {{0}};\n    printf(\"%d\\n\", M_FEATURES);\n");
+        let mut calls = "    float row[M_FEATURES] = {0};\n    printf(\"%d\\n\", M_FEATURES);\n".to_owned();
         for (name, index) in &found {
             calls += &format!("    row[0] = {index}.0f;\n    printf(\"%d\\n\", m_predict(row) == M_{name});\n");
         }
