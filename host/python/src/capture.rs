@@ -27,7 +27,7 @@ pub(crate) enum Meshes {
     Named(Vec<(String, Given)>),
 }
 
-/// Whether approaches are kept that touched nothing, or how many approaches are made, all of which are kept.
+/// Approaches to keep: those that touched nothing, too, or none of these; or their number, all of which are kept.
 #[derive(FromPyObject)]
 pub(crate) enum Approaches {
     Kept(bool),

@@ -183,7 +183,7 @@ impl Ensemble {
         ensemble.into()
     }
 
-    /// The same trees, of a classifier whose classes have these labels, an array in their order: models predict them.
+    /// These trees as a classifier's whose classes have these labels, an array in their order: models predict them.
     fn _with_labels(&self, labels: Py<PyAny>) -> Self {
         Self { ensemble: Arc::clone(&self.ensemble), labels: Some(labels) }
     }

@@ -93,7 +93,7 @@ def test_pipelines_in_pipelines_and_steps_that_do_nothing_keep_names_and_decisio
     expected = pipeline.predict(pandas.DataFrame(tried, columns=columns) if named else tried)
     assert np.array_equal(model.predict(tried), expected)
     if named:
-        # As without a scaler: names that a model cannot hold are changed.
+        # Names that a model cannot hold are changed, as without a scaler.
         plain = palpate.to_ensemble(sklearn.base.clone(FOREST).fit(table, y))
         assert model.features == plain.features == ["speed", "f1", "x" * 255, "temperature / °C", "f0"]
         assert set(plain.notes) <= set(model.notes)

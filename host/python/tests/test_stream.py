@@ -223,7 +223,7 @@ class PerRow(palpate.SequenceRecognizer):
         return self
 
     def __sklearn_tags__(self) -> Any:
-        # What they ask of classifiers is for labels of their own.
+        # They ask for labels of their own.
         tags = super().__sklearn_tags__()
         tags.estimator_type = tags.classifier_tags = None
         return tags
@@ -392,7 +392,7 @@ def lenient(**settings: Any) -> palpate.SequenceRecognizer:
     return palpate.SequenceRecognizer(estimators()[2], **({"error_rate": 0.2, "max_rows": LENGTH} | settings))
 
 
-# Where a sequence is undecided, with the label `undecided_`.
+# An undecided sequence has the label `undecided_`.
 @pytest.mark.filterwarnings("ignore:y_pred contains classes not in y_true")
 @pytest.mark.parametrize("kind", ["texts", "numbers", "objects"])
 def test_a_list_of_sequences_is_taken_by_splitters_scorers_and_searches_as_it_is(kind: str) -> None:

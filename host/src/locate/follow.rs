@@ -58,7 +58,7 @@ pub trait Locating: Send + Sync {
     fn may_name(&self) -> bool;
     /// Result of the test for unknown objects.
     fn familiarity(&self) -> Familiarity;
-    /// How well the touches fit the leader, in 1/64 nat.
+    /// Logarithm of the touches' likelihood under the leader for each touch, in 1/64 nat.
     fn fit(&self) -> i32;
     /// The most likely poses of an object, the largest share first, at most four.
     fn poses(&self, object: usize) -> Vec<Pose>;

@@ -114,7 +114,7 @@ impl Shape {
         Ok(shape.about(own, all))
     }
 
-    /// The same samples about the middle of a box, as far as another one and what is about it.
+    /// These samples about the middle of one box, as far as another box and the table around it reach.
     fn about(self, own: [[f64; 2]; 2], all: [[f64; 2]; 2]) -> Self {
         let middle = own.map(|[low, high]| ((low + high) / 2.0).round());
         let half = [0, 1].map(|axis| {

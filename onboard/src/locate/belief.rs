@@ -149,7 +149,7 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize, P: Pool> Lo
         self.maps.least_fit(self.most_likely()?.placement)
     }
 
-    /// How well the touches fit the leader's most likely cell: the logarithm of their likelihood for each touch, in 1/64 nat, given in
+    /// Fit of the touches to the leader's most likely cell: the logarithm of their likelihood for each touch, in 1/64 nat, given in
     /// each cell's interval of heights the one that fits best. Cost: a pass over the kept cells, a few instructions for each, and
     /// three lookups of heights for each touch. Cannot fail.
     pub fn fit(&self) -> i32 {

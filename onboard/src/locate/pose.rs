@@ -35,7 +35,7 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize, P: Pool> Lo
         }
         let mut found = 0;
         for slot in poses {
-            // Of several with the same share the first: the last of all in reverse.
+            // The first of several with the same share: the last of all in reverse.
             let largest = modes.iter_mut().rev().max_by_key(|mode| mode.map(|mode| mode.share));
             let Some(mode) = largest.and_then(Option::take) else { break };
             *slot = mode;

@@ -351,7 +351,7 @@ fn a_name_stays_with_its_place_whatever_is_touched_then() {
     assert!(locator.posterior(0) < 1_000, "{}", locator.posterior(0));
     locator.reset();
     assert_eq!((locator.verdict(), locator.best()), (Verdict::Undecided, locator.leader()));
-    // So does a verdict without a name.
+    // A verdict without a name stays, too.
     let bytes = model(&[WEDGE, CYLINDER], 0);
     let maps = Maps::new(&bytes).unwrap();
     let stopping = Stopping::from_odds((1 << 56) / 99, 2);

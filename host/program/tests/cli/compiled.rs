@@ -276,7 +276,7 @@ fn leaves_of_touches_of_more_than_fifty_objects_take_a_byte_unless_told_otherwis
         many.save(at.join("many.json")).unwrap();
         assert_eq!(figures(at, &format!("export many.json -o many.palpate {more}"))["leaf"], expected);
         if more.is_empty() {
-            // What the library does with it, too.
+            // The library does the same with it.
             let usual = palpate::compile::usual(&many);
             let compiled = palpate::compile::compile(&many, &usual).unwrap();
             assert_eq!(fs::read(at.join("many.palpate")).unwrap(), compiled.bytes);

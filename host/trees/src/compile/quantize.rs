@@ -49,7 +49,7 @@ impl Scale {
                 shift == 0 || shifts.contains(&0) || unit_for(all, most * f64::from(1 << (shift - 1))).is_none();
             Some(Self { unit, shifts }).filter(|scale| needed && fits(scale))
         });
-        // Of a base that is far larger than the leaves, the unit that holds it.
+        // A base that is far larger than the leaves sets the unit.
         let coarser = || {
             let unit =
                 unit_for(all, most).into_iter().flat_map(|unit| (1..32).map(move |step| unit * f32::exp2(step as f32)));

@@ -82,7 +82,7 @@ fn classes(
 /// Accepted distance of a value from the library's, beside the rounding of margins, in shares of the value: links are within
 /// 5e-7 of it.
 const LINK_ERROR: f64 = 2e-6;
-/// The same without a link, where the library's value may be an f32.
+/// Accepted distance without a link, where the library's value may be an f32.
 const F32_ERROR: f64 = f32::EPSILON as f64;
 
 fn values(

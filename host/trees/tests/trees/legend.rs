@@ -102,7 +102,7 @@ fn hard_names_of_features_and_classes_become_comments_and_constants_that_compile
         }
         let text = printed(directory.path(), "#include \"m.h\"\n", &calls, &[]);
         assert_eq!(text, format!("{}\n{}", HARD.len(), "1\n".repeat(HARD.len())));
-        // As C++, and as Rust, where text that is shown in another order is an error.
+        // C++ and Rust compile it, too; Rust refuses text that is shown in another order.
         put("m.cpp", "#include \"m.h\"\nint main() { return M_CLASS_BOWL; }\n");
         let mut cpp = Command::new(std::env::var("CXX").unwrap_or_else(|_| "c++".into()));
         cpp.args([
@@ -180,7 +180,7 @@ fn a_row_of_some_columns_says_which_and_that_the_others_are_not_in_it() {
         // Rows with all columns of the training have nothing to say.
         assert!(!source(&file.ensemble, language, false).contains("are not in a row"));
     }
-    // What a chip measures in whole numbers, and what whoever follows a sequence counts.
+    // A chip measures in whole numbers, and whoever follows a sequence counts its rows.
     let scales = Some([vec![100.0], vec![1.0; file.rows.features - 1]].concat());
     let position = Some(file.ensemble.inputs.names()[1].to_owned());
     let compiled = compile(&file.ensemble, &with!(Settings::default(), scales, position)).unwrap();

@@ -207,7 +207,7 @@ impl<'a, 'input> Scene<'a, 'input> {
     fn place_nodes(&mut self, scene: Node<'a, 'input>, turn: DAffine3) -> Result<(), Wrong> {
         let mut waiting = Vec::new();
         self.wait(scene, Ok(turn), &mut waiting)?;
-        // What is wrong with a transform counts where it places a geometry: cameras and lights have odd ones.
+        // A wrong transform counts where it places a geometry: cameras and lights have odd ones.
         let inner = |outer: Result<DAffine3, Wrong>, node| Ok(outer? * transform::of(node)?);
         while let Some((child, transform)) = waiting.pop() {
             match child.tag_name().name() {
