@@ -9,7 +9,6 @@ use crate::named::noise_of;
 use crate::work::{Callback, long};
 use palpate::compile;
 use palpate::ensemble::StatedProbe;
-use palpate::error::Error;
 use palpate::evaluate::{
     self as library, Candidate, LEAST_GROUPS, Margins, Settings, add_noise, parity::parity as compare,
 };
@@ -84,7 +83,7 @@ pub(crate) fn parity(
 ) -> Result<String, Failure> {
     let (ensemble, model, data) = (&ensemble.get().ensemble, model.get().model(), &data.get().dataset);
     let longest = model.trained_touches().largest_spread;
-    StatedProbe::compare_with(["the model", "the data set"], model.probe(), longest, data).map_err(Error::from)?;
+    StatedProbe::compare_with(["the model", "the data set"], model.probe(), longest, data)?;
     let found = long(py, progress.as_ref(), |progress| {
         let data = (**data).clone().matching(&ensemble.objects);
         compare(ensemble, model, &data, sequences, seed, progress)
