@@ -175,7 +175,7 @@ class Ensemble:
         """
     def _with_labels(self, /, labels: Any) -> Ensemble:
         """
-        The same trees, of a classifier whose classes have these labels, an array in their order: models predict them.
+        These trees as a classifier's whose classes have these labels, an array in their order: models predict them.
         """
     def _with_thresholds(self, /, thresholds: SupportsGetItem[int, SupportsFloat | SupportsIndex], names: SupportsGetItem[int, str] | None = None) -> Ensemble:
         """
@@ -271,7 +271,7 @@ class Locator:
     @property
     def located(self, /) -> Located:
         """
-        The verdict after the last touch.
+        The verdict and the place after the last touch.
         """
     def next(self, /) -> tuple[float, float, float]:
         """
@@ -336,8 +336,8 @@ class Maps:
         `confidence`, on sequences of approaches to these meshes on a simulated table.
 
         `aimed` says how approaches are aimed, and which approaches the promise is for: "chosen" ones, as by `Locator.next`, or "random"
-        ones about the place believed in. `real` is what the simulated hand and table add. `until` goes on until the place is as
-        sure, such as (3.0, 5.0) for 3 mm and 5 degrees. `unknown` makes a test for objects that the maps do not know: nothing
+        ones about the place believed in. `real` is what the simulated hand and table add. `until` goes on after the name until the
+        place is as sure, such as (3.0, 5.0) for 3 mm and 5 degrees. `unknown` makes a test for objects that the maps do not know: nothing
         is named before the eighth approach then. `workspace` is how far from the table's origin the middle finger comes down in x and
         y, in millimeters, by default twice the range.
         """
@@ -473,7 +473,8 @@ class Model:
     @property
     def margin_error(self, /) -> float:
         """
-        The largest possible difference of a margin from the full model's, in nats.
+        The largest possible difference of a margin from the full model's, in nats, or of a value's: of several targets that of
+        the one with the largest.
         """
     def margins(self, /, rows: DataSet | ArrayLike) -> NDArray[float64]:
         """
@@ -482,7 +483,8 @@ class Model:
 
         A model over touches takes a data set, or rows of three contact times in seconds (NaN where a finger did not
         touch), with the probe's direction and alignment nine numbers. A model over features takes rows of those, NaN where
-        one is missing; with leaves as f32 its margins are an XGBoost model's own, bit for bit. Of a table (pandas, polars, pyarrow)
+        one is missing; with leaves as f32 its margins are an XGBoost model's own, bit for bit, and those of a regression with
+        other leaves have the digits that f32 values lack. Of a table (pandas, polars, pyarrow)
         the columns are found by their names, in any order and among others.
         """
     @property
