@@ -287,7 +287,7 @@ mod tests {
             ([NAN; 3], "no finger touched"),
             ([-1.0, 0.0, 0.0], "the time -1 is negative"),
             ([f64::INFINITY, 0.0, 0.0], "inf is not finite"),
-            ([0.0, 0.0, 5_000.0], "longer than the 4294 s"),
+            ([0.0, 0.0, 5_000.0], "a touch can hold 4294 s"),
         ] {
             let mut step = decider.touch(&touch(times));
             let refused = std::mem::take(&mut step.verdict.refused);
