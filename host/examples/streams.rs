@@ -105,7 +105,7 @@ fn report(name: &str, all: &Sequences, names: &[String], rate: f64) -> Result<()
     let evaluated = stream::evaluate(&sure, &unseen, &Wanted::default())?;
     println!("{name}: {} sequences of {} classes, {} rows", all.sequences.len(), names.len(), all.len());
     if let Some(shape) = &found.rows {
-        println!("  scale {:?}\n  weights {:?}", shape.scale, shape.weights);
+        println!("  table {:?}\n  weights {:?}", shape.row_evidence, shape.weights);
     }
     println!(
         "  promised {:.0} %; of {} unseen sequences {:.2} % of the names wrong, {:.1} % without one, {:.1} rows",

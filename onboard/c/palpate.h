@@ -24,7 +24,7 @@
  *   PALPATE_LEAVES       types of leaves to read, such as PALPATE_I8; all by default
  *   PALPATE_SHARED       0: rejects models that store equal leaves once, in a table
  *   PALPATE_SENTINEL     0: rejects models over rows in which a number stands for a missing value
- *   PALPATE_WEIGHTS      0: rejects models that state how much rows count together
+ *   PALPATE_ROW_EVIDENCE 0: rejects models that state what a row adds to the evidence, or how much rows count together
  *   PALPATE_SEQUENCES    1: reads models that number the rows of a sequence, or state which of them they take; rejected by default
  *   PALPATE_OUTPUTS      1: reads models in which several outputs belong to one object; rejected by default
  *   PALPATE_STRANGERS    0: rejects models with a test for unknown objects, or with a background
@@ -59,8 +59,8 @@
 #ifndef PALPATE_SENTINEL
 #define PALPATE_SENTINEL 1
 #endif
-#ifndef PALPATE_WEIGHTS
-#define PALPATE_WEIGHTS 1
+#ifndef PALPATE_ROW_EVIDENCE
+#define PALPATE_ROW_EVIDENCE 1
 #endif
 #ifndef PALPATE_SEQUENCES
 #define PALPATE_SEQUENCES 0
@@ -183,6 +183,9 @@ typedef struct {
     const uint8_t *table_; /* values of the leaves that are shared, or NULL; before them the length of their numbers */
     const uint8_t *sentinel_; /* features that stand for a missing value, or NULL */
     const uint8_t *weights_; /* weights of evidence by the number of touches or rows, or NULL */
+    const uint8_t *row_; /* table from a row's margins to evidence; NULL: the margins */
+    int32_t row_start_;  /* the margin of that table's first value */
+    uint32_t row_most_;  /* beyond it, up to the last one */
 #if PALPATE_SEQUENCES
     const uint8_t *position_; /* the feature that is a row's number, or NULL */
     const uint8_t *guard_;    /* limits of each feature, or NULL */
@@ -215,7 +218,7 @@ typedef struct {
     uint8_t by_object;    /* 1: the model's thresholds by object come before `odds` */
     uint8_t verdict;      /* a palpate_verdict */
     uint8_t object;       /* the one that was recognized */
-#if PALPATE_WEIGHTS
+#if PALPATE_ROW_EVIDENCE
     uint32_t unit_, from_, span_; /* bits in a unit of evidence of this number of touches, and of this many numbers */
 #endif
     int64_t evidence[PALPATE_MAX_OBJECTS];
@@ -416,6 +419,35 @@ static inline int palpate_check_strangers_(palpate_model *model, const uint8_t *
     return 1;
 }
 
+/* Evidence of a row by its margins; 0 if it makes no sense. */
+static inline int palpate_check_row_(palpate_model *model, const uint8_t *content, uint32_t length)
+{
+    uint32_t start, i;
+    uint8_t dropped, between, scale, last;
+    if (!palpate_holds_(length, 8, 0, 0)) {
+        return 0;
+    }
+    start = palpate_u32_(content);
+    start = start >> 31 != 0 ? 0u - start : start;
+    dropped = PALPATE_BYTE(content + 4);
+    between = PALPATE_BYTE(content + 5);
+    scale = PALPATE_BYTE(content + 6);
+    last = PALPATE_BYTE(content + 7);
+    if (last == 0 || last > 128 || !palpate_holds_(length, 9, last, 1) || start > 0x40000000u || between > 15 ||
+        dropped + between > 26 || between + scale > 22 || model->descriptor != 255) {
+        return 0;
+    }
+    for (i = 8; i < 8u + last; i++) {
+        if (PALPATE_BYTE(content + i) > PALPATE_BYTE(content + i + 1)) {
+            return 0;
+        }
+    }
+    model->row_ = content;
+    model->row_start_ = palpate_i32_(content);
+    model->row_most_ = (PALPATE_AS_(uint32_t, last) << between) - 1;
+    return 1;
+}
+
 #if PALPATE_OUTPUTS
 /* Outputs of objects that are numbered in their order, and the most of one. */
 static inline int palpate_check_outputs_(const palpate_model *model, const uint8_t *content, uint32_t length)
@@ -520,7 +552,7 @@ static inline palpate_error palpate_check_sections_(palpate_model *model)
                     return PALPATE_FIELD;
                 }
                 model->sentinel_ = content;
-            } else if (PALPATE_WEIGHTS && last == 4) {
+            } else if (PALPATE_ROW_EVIDENCE && last == 4) {
                 /* Weights by the number of touches or rows. */
                 least = 2;
                 if (!palpate_holds_(length, least, 0, 0) || PALPATE_BYTE(content) - 1u > 63) {
@@ -529,6 +561,10 @@ static inline palpate_error palpate_check_sections_(palpate_model *model)
                 model->weights_ = content;
                 pieces = PALPATE_BYTE(content);
                 piece = 2;
+            } else if (PALPATE_ROW_EVIDENCE && last == 16) {
+                if (!palpate_check_row_(model, content, length)) {
+                    return PALPATE_FIELD;
+                }
 #if PALPATE_SEQUENCES
             } else if (last == 21) {
                 /* A feature that exists, and a step above 0, in a model over rows. */
@@ -672,15 +708,19 @@ static inline palpate_error palpate_check_groups_(palpate_model *model)
 /* The place of a number of the header that makes no sense; 0 if there is none. */
 static inline uint8_t palpate_wrong_number_(const uint8_t *bytes)
 {
-    const uint32_t unit = palpate_u32_(bytes + 32);
+    uint32_t unit = palpate_u32_(bytes + 32), shift, difference;
+    uint64_t bits = PALPATE_AS_(uint64_t, (unit & 0x7fffff) | 0x800000) * 3098164010u; /* log2 e in Q31 */
     if (unit < 0x33800000u || unit > 0x3f000000u) { /* 2^-24 to 0.5 */
         return 32;
     }
-    if (PALPATE_BYTE(bytes + 39) >> 7 == 0) {
-        return 36;
-    }
-    if (PALPATE_BYTE(bytes + 40) > 23) {
+    shift = 149u - (unit >> 23) - PALPATE_BYTE(bytes + 40);
+    if (shift > 63) {
         return 40;
+    }
+    bits = (bits >> shift) + 2 - palpate_u32_(bytes + 36);
+    difference = PALPATE_AS_(uint32_t, bits >> 32);
+    if (difference != 0 || PALPATE_AS_(uint32_t, bits) > 4) {
+        return 36;
     }
     return PALPATE_BYTE(bytes + 55) != 0 ? 48 : palpate_u32_(bytes + 56) == 0 ? 56 : 0;
 }
@@ -791,8 +831,9 @@ static inline palpate_error palpate_open_(palpate_model *model, const uint8_t *b
     if (PALPATE_SENTINEL) {
         model->sentinel_ = NULL;
     }
-    if (PALPATE_WEIGHTS) {
+    if (PALPATE_ROW_EVIDENCE) {
         model->weights_ = NULL;
+        model->row_ = NULL;
     }
 #if PALPATE_SEQUENCES
     model->position_ = NULL;
@@ -1341,7 +1382,7 @@ PALPATE_API uint64_t palpate_exp2(uint64_t u)
 static inline uint32_t palpate_bits_(const palpate_model *model, uint32_t touches, uint32_t *from, uint32_t *span)
 {
     const uint32_t bits = palpate_u32_(model->bytes + 36);
-    const uint8_t *weights = PALPATE_WEIGHTS ? model->weights_ : NULL;
+    const uint8_t *weights = PALPATE_ROW_EVIDENCE ? model->weights_ : NULL;
     uint32_t at = 0, last;
     *from = 0;
     *span = UINT32_MAX;
@@ -1363,7 +1404,7 @@ static inline uint32_t palpate_bits_(const palpate_model *model, uint32_t touche
 /* Bits in a unit of the evidence so far; next to no cost while it stays. */
 static inline uint32_t palpate_unit_(palpate_recognizer *recognizer)
 {
-#if PALPATE_WEIGHTS
+#if PALPATE_ROW_EVIDENCE
     const uint32_t touches = recognizer->touches;
     if (touches - recognizer->from_ >= recognizer->span_) {
         recognizer->unit_ = palpate_bits_(recognizer->model, touches, &recognizer->from_, &recognizer->span_);
@@ -1434,7 +1475,7 @@ static inline void palpate_start_(palpate_recognizer *recognizer, const palpate_
     recognizer->odds = palpate_u32_(bytes + 48) | PALPATE_AS_(uint64_t, palpate_u32_(bytes + 52)) << 32;
     recognizer->max_touches = palpate_u32_(bytes + 56);
     recognizer->by_object = 1;
-#if PALPATE_WEIGHTS
+#if PALPATE_ROW_EVIDENCE
     recognizer->from_ = 0;
     recognizer->span_ = 0;
     recognizer->unit_ = 0;
@@ -1561,6 +1602,30 @@ static inline palpate_verdict palpate_by_misfit_(const palpate_recognizer *recog
         return PALPATE_UNDECIDED; /* the background has more */
     }
     return PALPATE_RECOGNIZED;
+}
+
+/* Replaces the margins of a row by its evidence, by the model's table from margins to evidence. */
+static inline void palpate_evidence_of_(const palpate_model *model, int32_t *margins)
+{
+    const uint8_t *row = model->row_;
+    const int32_t *end = margins + model->objects;
+    const uint32_t most = model->row_most_;
+    const int32_t start = model->row_start_;
+    for (; margins != end; margins++) {
+        const uint8_t *value = row;
+        uint32_t beyond = 0, at, rise;
+        if (*margins > start) {
+            beyond = (PALPATE_AS_(uint32_t, *margins) - PALPATE_AS_(uint32_t, start)) >> PALPATE_BYTE(row + 4);
+            beyond = beyond < most ? beyond : most;
+        }
+        at = beyond >> PALPATE_BYTE(row + 5);
+        value += at;
+        beyond -= at << PALPATE_BYTE(row + 5);
+        at = PALPATE_BYTE(value + 8);
+        rise = (PALPATE_BYTE(value + 9) - at) * beyond;
+        at <<= PALPATE_BYTE(row + 5);
+        *margins = PALPATE_AS_(int32_t, (at + rise) << PALPATE_BYTE(row + 6));
+    }
 }
 
 /* part / whole in Q56, rounded down, for a part that is at most the whole. */
@@ -1791,6 +1856,12 @@ PALPATE_API void palpate_push_margins(palpate_recognizer *recognizer, const int3
     for (i = 0; i < recognizer->model->objects; i++) {
         evidence[i] = i < count ? margins[i] : 0;
     }
+    if (PALPATE_ROW_EVIDENCE && recognizer->model->row_ != NULL) {
+        palpate_evidence_of_(recognizer->model, evidence);
+        for (i = 0; i < recognizer->model->objects; i++) {
+            evidence[i] = i < count ? evidence[i] : 0;
+        }
+    }
     palpate_push_evidence_(recognizer, evidence);
 }
 
@@ -1819,6 +1890,9 @@ PALPATE_API palpate_answer palpate_push_features(palpate_recognizer *recognizer,
         return PALPATE_NEEDS_TOUCHES;
     }
     palpate_margins_of_(recognizer->model, features, count, margins);
+    if (PALPATE_ROW_EVIDENCE && recognizer->model->row_ != NULL) {
+        palpate_evidence_of_(recognizer->model, margins);
+    }
     palpate_push_evidence_(recognizer, margins);
     return PALPATE_COUNTED;
 }

@@ -68,7 +68,7 @@
 //! | `i8-leaves`, `i16-leaves`, `f32-leaves` | types of leaves that can be read |
 //! | `shared-leaves` | trees whose equal leaves are stored once |
 //! | `sentinel` | models over rows in which a number stands for a missing value |
-//! | `weights` | models that state how much rows count together |
+//! | `row-evidence` | models that state what a row adds to the evidence, and how much rows count together |
 //! | `sequences` | models that number the rows of a sequence, or state which of them they take |
 //! | `strangers` | models with a background, or a test for objects that they do not know |
 //! | `outputs` | models with several outputs for one object |

@@ -188,8 +188,8 @@ fn header(put: Put<'_>) {
     at("a unit that is too coarse", 32, &1.0_f32.to_le_bytes());
     at("a unit that is not a number", 32, &f32::NAN.to_le_bytes());
     at("a negative unit", 32, &(-0.01_f32).to_le_bytes());
-    at("a unit of evidence without its highest bit", 36, &[good[36], good[37], good[38], good[39] & 0x7f]);
-    at("a unit shift beyond 23", 40, &[24]);
+    at("unit bits of another unit", 36, &[good[36] ^ 0x10]);
+    at("a unit shift beyond 63", 40, &[64]);
     at("a threshold that a tie passes", 48, &(1_u64 << 56).to_le_bytes());
     at("no touch at all", 56, &[0; 4]);
     let raw = changed(&good, 12, &[255]);
@@ -402,6 +402,24 @@ fn predictions(put: Put<'_>) {
     with("outputs that are cut", Tag::Outputs, &outputs(0, &each[1..]));
     with("outputs whose numbers do not begin with 0", Tag::Outputs, &outputs(objects as u8 - 1, &vec![1; objects]));
     with("more outputs of an object than are stated", Tag::Outputs, &outputs(0, &vec![0; objects]));
+    let table = [0, 0, 0, 0, 4, 3, 0, 1, 1, 2];
+    with("evidence of a row in a model over touches", Tag::RowEvidence, &table);
+    let rows = changed_to_rows(&plain);
+    let mut with = |name: &str, content: &[u8]| {
+        let bytes = with_sections(&rows, &section(Tag::RowEvidence.code() | MUST_UNDERSTAND, content));
+        put(name, "field", optional, bytes);
+    };
+    let at = |place: usize, value: u8| {
+        let mut table = table;
+        table[place] = value;
+        table
+    };
+    with("evidence of a row that is cut", &table[..9]);
+    with("evidence of a row by one value", &at(7, 0));
+    with("evidence of a row that falls", &at(9, 0));
+    with("evidence of a row in steps that are too wide", &at(4, 24));
+    with("evidence of a row in units that are too large", &at(6, 20));
+    with("evidence of a row that starts beyond all margins", &at(3, 0x41));
 }
 
 /// Damage to what a model says about rows of sequences.
@@ -581,6 +599,7 @@ fn rows_with_all_sections() -> (String, Vec<u8>, Vec<Cut>) {
     let mut outputs = Vec::new();
     Outputs::write((0..objects as u8).map(|output| (output / 2, 0.5)), &mut |part| outputs.extend_from_slice(part));
     let names = [0, 0, 0x80, 0x3f, 1, b'a', 0, 0, 0x80, 0x3f, 2, b'b', b'c'];
+    let table = [0, 0, 0, 0, 4, 3, 0, 4, 0, 1, 1, 2, 9];
     let limits = Limits { low: -9, high: 1 << 20, may_miss: true, most_equal: 5 };
     let guard = limits.to_bytes().repeat(usize::from(plain[15]) + 1);
     let mut prediction = Vec::new();
@@ -591,6 +610,7 @@ fn rows_with_all_sections() -> (String, Vec<u8>, Vec<Cut>) {
         (Tag::FeatureNames.code(), names.to_vec(), 0),
         (must(Tag::Prediction), prediction.clone(), prediction.len()),
         (must(Tag::Sentinel), Sentinel { low: -1, high: 1 }.to_bytes().to_vec(), 8),
+        (must(Tag::RowEvidence), table.to_vec(), table.len()),
         (must(Tag::Outputs), outputs.clone(), outputs.len()),
         (Tag::Columns.code(), vec![4, 0, 0, 0, 3, 0], 0),
         (must(Tag::Position), Position { feature: 0, step: 3 }.to_bytes().to_vec(), Position::LENGTH),

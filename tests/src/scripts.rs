@@ -6,12 +6,12 @@ use crate::sections::with_sections;
 use crate::vectors;
 use palpate_onboard::Model;
 use palpate_shared::format::{
-    Limits, Link, MisfitTerms, ObjectMisfit, OddsByObject, OutputScale, Outputs, Plan, Position, Prediction, Section,
-    Sentinel, Strangers, Tag, Temperature, Weights, f32_key, write_section,
+    Limits, Link, MisfitTerms, ObjectMisfit, OddsByObject, OutputScale, Outputs, Plan, Position, Prediction,
+    RowEvidence, Section, Sentinel, Shifts, Strangers, Tag, Temperature, Weights, f32_key, write_section,
 };
 use palpate_shared::{ContactTime, MISSING_FEATURE, Pose, Poses, Touch};
+use rand::RngExt;
 use rand::rngs::SmallRng;
-use rand::{Rng, RngExt};
 
 const VECTORS: &str = include_str!("../../shared/vectors/vectors.txt");
 
@@ -87,6 +87,9 @@ fn with_all_sections(bytes: &[u8], rng: &mut SmallRng) -> Vec<u8> {
         let sentinel = Sentinel { low, high: low + rng.random_range(0..100_000) };
         write_section(Tag::Sentinel, true, &sentinel.to_bytes(), &mut put);
     }
+    if model.descriptor().is_none() && rng.random_bool(0.7) {
+        write_section(Tag::RowEvidence, true, &row_evidence(rng), &mut put);
+    }
     if rng.random_bool(0.5) {
         write_section(Tag::Outputs, true, &outputs(objects, rng), &mut put);
     }
@@ -99,13 +102,7 @@ fn with_all_sections(bytes: &[u8], rng: &mut SmallRng) -> Vec<u8> {
         }
     }
     Section { tag: 300, must_understand: false, content: b"later" }.write(&mut put);
-    let mut bytes = bytes.to_vec();
-    if model.descriptor().is_none() && rng.random_bool(0.5) {
-        // Evidence that a calibration scaled: the unit's highest bit stays.
-        rng.fill_bytes(&mut bytes[36..39]);
-        bytes[40] = (bytes[40] + rng.random_range(0..3)).min(23);
-    }
-    with_sections(&bytes, &sections)
+    with_sections(bytes, &sections)
 }
 
 /// Weights by the number of touches, now and then up to the most.
@@ -114,6 +111,21 @@ fn weights(rng: &mut SmallRng) -> Vec<u8> {
     let count = [1, 2, 7, 16, Weights::MOST][rng.random_range(0..5)];
     let weights: Vec<u32> = (0..count).map(|_| rng.random_range(1..=Weights::ONE)).collect();
     Weights::write(&weights, &mut |part| content.extend_from_slice(part));
+    content
+}
+
+/// A table from margins to evidence, about margins that occur.
+fn row_evidence(rng: &mut SmallRng) -> Vec<u8> {
+    let mut content = Vec::new();
+    let between = rng.random_range(0..=Shifts::MOST_BETWEEN);
+    let dropped = rng.random_range(0..=Shifts::MOST_STEP - between);
+    let scale = rng.random_range(0..=Shifts::MOST_SCALE - between);
+    let mut values: Vec<u8> = (0..rng.random_range(2..=RowEvidence::MOST)).map(|_| rng.random()).collect();
+    values.sort_unstable();
+    let step = dropped + between;
+    let start = -(1_i32 << rng.random_range(0..=30)).min(1 << rng.random_range(step..27).min(30));
+    let shifts = Shifts { dropped, between, scale };
+    RowEvidence::write(start, shifts, &values, &mut |part| content.extend_from_slice(part));
     content
 }
 

@@ -27,7 +27,7 @@ pub(crate) enum Meshes {
     Named(Vec<(String, Given)>),
 }
 
-/// Approaches to keep: those that touched nothing, too, or none of these; or their number, all of which are kept.
+/// A flag that keeps approaches that touched nothing, too; or a number of approaches, all kept.
 #[derive(FromPyObject)]
 pub(crate) enum Approaches {
     Kept(bool),

@@ -54,6 +54,8 @@ def test_a_promise_is_kept_on_fresh_sequences_by_models_of_every_kind(kind: int)
     ends = palpate.evaluate_sequences(sure.model, X, y, sequence=sequence)
     assert 0.02 < ends.error < 0.06 and ends.mean_rows < LENGTH, ends
     assert ends.raw["promise"]["finding"] != "broken"
+    # A forest's shares of votes are no log-probabilities: a table makes evidence of them.
+    assert sure.raw["row_evidence"]["kept"] or kind != 2
 
 
 def test_the_recognizer_gives_the_verdicts_that_the_evaluation_counts() -> None:
@@ -191,7 +193,7 @@ def test_copies_of_sequences_under_other_ids_are_noted() -> None:
         noted = palpate.calibrate(fitted, *four, sequence=ids, error_rate=0.2)
     assert noted.raw["note"].startswith("300 of 400 sequences")
     # Within a group that is what groups are for.
-    palpate.calibrate(fitted, *four, sequence=ids, groups=ids % 1000, error_rate=0.3)
+    palpate.calibrate(fitted, *four, sequence=ids, groups=ids % 1000, error_rate=0.2)
 
 
 def test_a_limit_of_no_rows_is_called_by_its_name() -> None:

@@ -130,8 +130,8 @@ impl Used {
 /// The shape of evidence of rows, as a calibration found it.
 #[derive(Clone, Debug, Serialize)]
 pub struct OfRows {
-    /// Gain of a factor from margins to evidence; `None` where there are too few sequences to know.
-    pub scale: Option<Gain>,
+    /// Gain of a table from margins to evidence; `None` where there are too few sequences to know.
+    pub row_evidence: Option<Gain>,
     /// Gain of weights of evidence by the number of rows; likewise.
     pub weights: Option<Gain>,
     /// The weights that are kept: of 1, 2, 4, 8 and so on rows.

@@ -209,7 +209,7 @@ impl<'m> Material<'m> {
 
     /// The sequences of each object of so many in all: as often as the model's priors say.
     pub(super) fn by_priors(&self, count: usize) -> Vec<usize> {
-        let prior = |&output: &usize| (f64::from(self.model.prior(output)) * self.model.evidence_unit()).exp();
+        let prior = |&output: &usize| (f64::from(self.model.prior(output)) * f64::from(self.model.unit())).exp();
         let weights: Vec<f64> = self.outputs.iter().map(|own| own.iter().map(prior).sum()).collect();
         let sum: f64 = weights.iter().sum();
         weights.into_iter().map(|weight| of_share(weight / sum, count)).collect()

@@ -128,5 +128,5 @@ fn numbers_of_approaches(margins: &Margins<'_>, wanted: Option<&[usize]>) -> Vec
 
 /// The weights that a model's own priors stand for.
 pub fn own_weights(model: &palpate_onboard::Model<'_>) -> Vec<f64> {
-    (0..model.object_count()).map(|object| (f64::from(model.prior(object)) * model.evidence_unit()).exp()).collect()
+    (0..model.object_count()).map(|object| (f64::from(model.prior(object)) * f64::from(model.unit())).exp()).collect()
 }

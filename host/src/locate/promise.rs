@@ -394,7 +394,8 @@ fn opened(bytes: &[u8]) -> Result<Maps<'_>> {
     Ok(Maps::new(bytes).map_err(|error| LocateProblem::Refused { error })?)
 }
 
-/// For each of so many objects the least fit that all but a share of its sequences keep while it leads, from where a test decides.
+/// Limit of the fit for each object: while it leads, all but a share of its own sequences stay above it from the touch on at which a
+/// test decides.
 fn least_fits(each: &[Played], objects: usize) -> Vec<i16> {
     let least = |object: usize| {
         let lowest =
@@ -462,8 +463,8 @@ struct Played {
     looked: [u64; 2],
 }
 
-/// Plays sequences until a name is sure from so many touches on, and with [`Terms::until`] until the pose of the named object is; each
-/// as of an object that there cannot be, if its own is left out.
+/// Plays sequences until a name is sure, after a least number of touches, and with [`Terms::until`] until the pose of the named object
+/// is. An object that is left out is impossible by its prior.
 fn play(
     maps: Maps<'_>,
     standing: &[Standing],

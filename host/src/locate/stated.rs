@@ -74,7 +74,7 @@ pub(super) fn reachable(stated: impl IntoIterator<Item = (&'static str, f64)>) -
     }
 }
 
-/// Direction of a row of fingers that is turned by so many degrees from the x axis.
+/// Direction of the row of fingers at an angle from the x axis, in degrees.
 ///
 /// # Errors
 /// [`Setting`](crate::error::Setting) beyond a full turn to either side.

@@ -135,7 +135,7 @@ fn one<'r>(
 /// True if the leader's posterior passes the model's threshold.
 fn is_decided(model: &Model<'_>, numbers: Option<&[u8]>, evidence: &[i64], touches: u32) -> bool {
     if numbers.is_some() {
-        let unit = model.evidence_unit() * f64::from(model.weight_of(touches)) / 65_536.0;
+        let unit = f64::from(model.unit()) * f64::from(model.weight_of(touches)) / 65_536.0;
         let evidence: Vec<f64> = evidence.iter().map(|&sum| sum as f64).collect();
         let (leader, rivals) = leading(&evidence, model.known_count(), numbers, unit);
         return rivals <= Stopping::from_model(model).odds_of(leader, model) as f64 / 2.0_f64.powi(56);
@@ -144,7 +144,7 @@ fn is_decided(model: &Model<'_>, numbers: Option<&[u8]>, evidence: &[i64], touch
     let leader = known.reduce(|best, other| if evidence[other] > evidence[best] { other } else { best }).unwrap_or(0);
     // A weight of 1 changes nothing.
     let weight = f64::from(model.weight_of(touches)) / 65_536.0;
-    let ahead = |other: i64| (other - evidence[leader]) as f64 * model.evidence_unit() * weight;
+    let ahead = |other: i64| (other - evidence[leader]) as f64 * f64::from(model.unit()) * weight;
     let others = evidence.iter().enumerate().filter(|(object, _)| *object != leader);
     let rivals: f64 = others.map(|(_, &other)| ahead(other).exp()).sum();
     rivals <= Stopping::from_model(model).odds_of(leader, model) as f64 / 2.0_f64.powi(56)

@@ -166,7 +166,7 @@ pub(crate) fn calibrate_supplies(
 ) -> Result<Tested> {
     check(settings)?;
     let objects = model.object_count();
-    let unit = model.evidence_unit();
+    let unit = f64::from(model.unit());
     let (learn, test) = learned_and_tested(given, objects);
     let known = model.known_count();
     let moments = Moments::new(&learn, shapes, known, objects, unit);
@@ -350,7 +350,7 @@ fn terms(settings: &Settings, misfits: &[misfit::Misfit], threshold: f64) -> Mis
 fn stated(model: &Model<'_>, terms: &MisfitTerms, misfits: &[misfit::Misfit]) -> Result<Vec<u8>> {
     let mut section = Strangers::header(model.background().is_some(), true).to_vec();
     section.extend(terms.to_bytes());
-    misfits.iter().for_each(|misfit| fixed::write(misfit, model.evidence_unit(), &mut section));
+    misfits.iter().for_each(|misfit| fixed::write(misfit, f64::from(model.unit()), &mut section));
     let sections = vec![(Tag::Strangers, Some((true, section))), (Tag::Promise, None)];
     restate(model, &Restated { sections, ..Restated::default() })
 }

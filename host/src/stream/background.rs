@@ -32,14 +32,21 @@ pub(super) fn test<'s>(
     let (alarms, parts) = parts.divided(TESTED);
     // Of groups one sequence each: these are independent.
     let alarms = Parts::once(&alarms);
+    let evidence = |margins: Vec<i32>| {
+        let mut margins = margins;
+        margins.chunks_exact_mut(begun.object_count()).for_each(|row| begun.make_evidence(row));
+        margins
+    };
     let pools = |class: usize| {
         let own = alarms.iter().filter(|sequence| sequence.class == class);
-        let of = |sequence: &&RowSequence| sequence.rows.clone().flat_map(|row| rows.row(row)).copied().collect();
+        let of =
+            |sequence: &&RowSequence| evidence(sequence.rows.clone().flat_map(|row| rows.row(row)).copied().collect());
         Pools::of_rows(own.map(of).collect())
     };
     let supplies = (0..begun.known_count()).map(pools).collect();
     let objects = begun.object_count();
     let mean = |margins: &Vec<i32>| {
+        let margins = evidence(margins.clone());
         let count = (margins.len() / objects).max(1) as f64;
         (0..objects)
             .map(|object| margins.iter().skip(object).step_by(objects).map(|&m| f64::from(m)).sum::<f64>() / count)

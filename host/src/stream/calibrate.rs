@@ -236,7 +236,7 @@ fn finished(
         groups: parts.has_groups.then(|| parts.units_tested()),
         learned: Some(parts.learned.len()),
         used: Used::Rows { mean_rows: chosen.mean_touches, max_rows },
-        rows: Some(OfRows { scale: fitted.scale, weights: fitted.weights, weights_by_doubling }),
+        rows: Some(OfRows { row_evidence: fitted.table, weights: fitted.weights, weights_by_doubling }),
         ..calibrated
     })
 }

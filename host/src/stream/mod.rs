@@ -115,8 +115,7 @@ impl<'r> Rows<'r> {
     /// Margins that were computed before, row after row, one for each of the model's classes, in its units.
     pub(crate) fn of(model: &Model<'_>, margins: Cow<'r, [i32]>) -> Self {
         let unit = f64::from(model.unit());
-        let prior = |object| f64::from(model.prior(object)) * model.evidence_unit();
-        let priors = (0..model.object_count()).map(prior).collect();
+        let priors = (0..model.object_count()).map(|object| f64::from(model.prior(object)) * unit).collect();
         Self { margins, objects: model.object_count(), known: model.known_count(), unit, priors }
     }
 

@@ -97,7 +97,7 @@ pub(super) fn numbered(text: impl BufRead, path: &Path) -> impl Iterator<Item = 
     })
 }
 
-/// Reads the touches of one text file of which no origin is known; blank lines are skipped.
+/// Reads the touches of one text file, whose origin is not stated; blank lines are skipped.
 ///
 /// # Errors
 /// When the file cannot be read, holds no touch, has a wrong line, or times that are not in seconds.

@@ -255,7 +255,7 @@ fn weights_are_kept_where_rows_resemble_each_other_and_not_where_they_are_indepe
     };
     let independent = of(Kind::Independent, 60);
     assert!(!independent.rows.as_ref().unwrap().weights.unwrap().kept, "{independent:?}");
-    assert!(!independent.rows.as_ref().unwrap().scale.unwrap().kept, "{independent:?}");
+    assert!(!independent.rows.as_ref().unwrap().row_evidence.unwrap().kept, "{independent:?}");
     assert_eq!(compile::open(&independent.model).unwrap().weight_of(8), Weights::ONE);
     let dependent = of(Kind::Autoregressive(0.9), 160);
     let shape = dependent.rows.as_ref().unwrap();

@@ -78,7 +78,7 @@ const MOST_BITS: u64 = 1 << 42;
 impl Unit {
     /// The unit of evidence with a weight in Q16 that is at most 1, rounded down: in products of 32 bits.
     pub(crate) const fn weighed(self, weight: u32) -> Self {
-        if !cfg!(feature = "weights") || weight >= Weights::ONE {
+        if !cfg!(feature = "row-evidence") || weight >= Weights::ONE {
             return self;
         }
         // Below 2^32 each, and together.
@@ -88,7 +88,7 @@ impl Unit {
 
     /// e^-(`ahead` units) in Q56.
     pub(super) fn weight(self, ahead: u64) -> u64 {
-        // 2^32 units are at least 256 bits.
+        // 2^32 units are at least 256 nats.
         let Ok(ahead) = u32::try_from(ahead).map(u64::from) else { return 0 };
         let bits = (ahead * u64::from(self.bits)) >> (self.shift & 63);
         if self.sharpness == SHARPNESS {

@@ -155,7 +155,8 @@ impl<'m, const N: usize> Recognizer<'m, N> {
     /// # Errors
     /// [`Refused::NeedsTouches`], for a model over touches; [`Refused::NeedsSeen`], for one that states which rows it takes.
     pub fn push_features(&mut self, features: &[i32]) -> Result<Verdict, Refused> {
-        let margins = self.margins_of_next(features)?;
+        let mut margins = self.margins_of_next(features)?;
+        self.model.make_evidence(&mut margins);
         Ok(self.add(&margins))
     }
 
@@ -186,7 +187,13 @@ impl<'m, const N: usize> Recognizer<'m, N> {
     /// Takes in a touch by its margins, computed beforehand with [`Model::margins`]; missing ones count as 0. For
     /// replaying the same touches in many orders.
     pub fn push_margins(&mut self, margins: &[i32]) -> Verdict {
-        self.add(margins)
+        if self.model.row_evidence().is_none() {
+            return self.add(margins);
+        }
+        let mut evidence = [0; N];
+        evidence.iter_mut().zip(margins).for_each(|(evidence, &margin)| *evidence = margin);
+        self.model.make_evidence(&mut evidence);
+        self.add(evidence.get(..margins.len()).unwrap_or(&evidence))
     }
 
     /// The verdict after the last touch.

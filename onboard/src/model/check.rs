@@ -7,8 +7,6 @@ use palpate_shared::format::{Group, Header, Key, Layout, LeafType, MARGIN_LIMIT,
 
 /// The largest shift of a group.
 const MAX_SHIFT: u8 = 24;
-/// The largest shift of the unit of evidence: 2^32 units, from which evidence weighs nothing, are 256 bits or more.
-const MOST_UNIT_SHIFT: u8 = 23;
 
 /// Checks the numbers of the header, the axes, the groups, and the lengths of splits and leaves. Sets what the optional
 /// sections state.
@@ -97,19 +95,25 @@ pub(super) fn check(model: &Sections<'_>, optional: &[u8], stated: &mut Stated) 
     if range.saturating_add(largest_base) > limit { Err(Wrong::MarginRange) } else { Ok(()) }
 }
 
-/// The offset of a number of the header that makes no sense: a unit beyond its limits, a unit of evidence beyond its own, a
-/// threshold that a tie would pass, no touch. Without floating point.
+/// The offset of a number of the header that makes no sense: a unit beyond its limits or in other bits than `unit_bits`
+/// states, a threshold that a tie would pass, no touch. Without floating point.
 fn wrong_number(header: &Header<'_>) -> Option<usize> {
     const LEAST_UNIT: u32 = 0x3380_0000; // 2^-24 nats
     const LARGEST_UNIT: u32 = 0x3f00_0000; // 0.5 nats
-    if !(LEAST_UNIT..=LARGEST_UNIT).contains(&header.unit().to_bits()) {
+    const LOG2_E: u64 = 3_098_164_010; // in Q31
+    let unit = header.unit().to_bits();
+    if !(LEAST_UNIT..=LARGEST_UNIT).contains(&unit) {
         return Some(32);
     }
-    if header.unit_bits() >> 31 == 0 {
-        return Some(36);
-    }
-    if header.unit_shift() > MOST_UNIT_SHIFT {
+    // The unit is mantissa · 2^(exponent − 150) nats, and unit_bits · 2^-(32 + unit_shift) bits.
+    let (mantissa, exponent) = (unit & 0x7f_ffff | 0x80_0000, unit >> 23);
+    let bits = u64::from(mantissa) * LOG2_E;
+    let shift = 149_u32.wrapping_sub(exponent).wrapping_sub(header.unit_shift().into());
+    if shift > 63 {
         return Some(40);
+    }
+    if (bits >> shift).abs_diff(header.unit_bits().into()) > 2 {
+        return Some(36);
     }
     if header.odds() >= 1 << 56 {
         return Some(48);

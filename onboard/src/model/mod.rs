@@ -23,8 +23,8 @@ use crate::bytes::{ModelError, at, take};
 use crate::layouts::{Places, Sections, built_in};
 use palpate_shared::format::{
     Counted, Feature, Fingerprints, Guard, HEADER_LENGTH, Header, Key, Layout, LeafType, OddsByObject, Outputs,
-    PatternShares, Plan, Position, Promise, Section, Sentinel, SharedLeaves, Strangers, Tag, Temperature, TrainedNoise,
-    TrainedProbe, TrainedTouches, Weights, take_feature, take_section,
+    PatternShares, Plan, Position, Promise, RowEvidence, Section, Sentinel, SharedLeaves, Strangers, Tag, Temperature,
+    TrainedNoise, TrainedProbe, TrainedTouches, Weights, take_feature, take_section,
 };
 use palpate_shared::{Descriptor, MISSING_FEATURE, Patterns};
 
@@ -50,9 +50,9 @@ pub(crate) struct Stated {
     counted: Counted,
     needs_pose: bool,
     largest_spread: u32,
-    /// Offset of thresholds by object; 0 if there are none. The six highest bits are flags of
+    /// Offset of thresholds by object; 0 if there are none. The seven highest bits are flags of
     /// sections about strangers, of shared leaves, of features that stand for a missing value, of weights by the number of
-    /// touches, of outputs that belong together, and of rows that are numbered or guarded.
+    /// touches, of the evidence of a row, of outputs that belong together, and of rows that are numbered or guarded.
     by_object: u32,
 }
 
@@ -64,12 +64,15 @@ const HAS_SHARED_LEAVES: u32 = 1 << 30;
 const HAS_SENTINEL: u32 = 1 << 29;
 /// Flag of weights by the number of touches.
 const HAS_WEIGHTS: u32 = 1 << 28;
+/// Flag of the evidence of a row.
+const HAS_ROW_EVIDENCE: u32 = 1 << 27;
 /// Flag of outputs that belong together.
-const HAS_OUTPUTS: u32 = 1 << 27;
+const HAS_OUTPUTS: u32 = 1 << 26;
 /// Flag of rows that are numbered or guarded.
-const HAS_SEQUENCES: u32 = 1 << 26;
+const HAS_SEQUENCES: u32 = 1 << 25;
 /// Flags that are not a place in [`Stated::by_object`].
-const MARKS: u32 = HAS_STRANGERS | HAS_SHARED_LEAVES | HAS_SENTINEL | HAS_WEIGHTS | HAS_OUTPUTS | HAS_SEQUENCES;
+const MARKS: u32 =
+    HAS_STRANGERS | HAS_SHARED_LEAVES | HAS_SENTINEL | HAS_WEIGHTS | HAS_ROW_EVIDENCE | HAS_OUTPUTS | HAS_SEQUENCES;
 
 impl Stated {
     /// Statements of a model without optional sections.
@@ -228,13 +231,34 @@ impl<'a> Model<'a> {
         Sentinel::from_bytes(optional::find(self.optional(), Tag::Sentinel))
     }
 
+    /// The table that makes evidence of a row's margins, if the model has one; otherwise margins are evidence.
+    ///
+    /// Cost: next to none if there is none, otherwise a few instructions for each optional section. Cannot fail.
+    pub fn row_evidence(&self) -> Option<RowEvidence<'a>> {
+        if !cfg!(feature = "row-evidence") || self.stated.by_object & HAS_ROW_EVIDENCE == 0 {
+            return None;
+        }
+        RowEvidence::opened(optional::find(self.optional(), Tag::RowEvidence))
+    }
+
+    /// Makes evidence of a row's margins, in units: what the row adds for each object. Without a
+    /// [table](Model::row_evidence) margins stay as they are.
+    ///
+    /// Cost: with a table two of its values and a multiplication for each object, and a search among the optional sections.
+    /// Cannot fail.
+    pub fn make_evidence(&self, margins: &mut [i32]) {
+        if let Some(table) = self.row_evidence() {
+            margins.iter_mut().take(self.object_count()).for_each(|margin| *margin = table.of(*margin));
+        }
+    }
+
     /// Weight of the evidence of this many touches or rows when it is compared with a threshold, in Q16: 65,536, which is 1,
     /// unless the model states [others](Weights).
     ///
     /// Cost: next to none if it states none, otherwise leading zeros, and a search among the optional sections.
     /// Cannot fail.
     pub fn weight_of(&self, touches: u32) -> u32 {
-        if !cfg!(feature = "weights") || self.stated.by_object & HAS_WEIGHTS == 0 {
+        if !cfg!(feature = "row-evidence") || self.stated.by_object & HAS_WEIGHTS == 0 {
             return Weights::ONE;
         }
         Weights::from_bytes(optional::find(self.optional(), Tag::Weights))
@@ -330,15 +354,6 @@ impl<'a> Model<'a> {
     /// Nats in one unit of a margin.
     pub fn unit(&self) -> f32 {
         self.header().unit()
-    }
-
-    /// Nats of evidence in one unit of a margin: its [`unit`](Self::unit), unless a calibration on rows scaled the evidence.
-    ///
-    /// Cost: two multiplications in f64, in software on most chips.
-    pub fn evidence_unit(&self) -> f64 {
-        let header = self.header();
-        let least = 1.0 / (1_u64 << 32 << (header.unit_shift() & 31)) as f64;
-        f64::from(header.unit_bits()) * least * core::f64::consts::LN_2
     }
 
     /// The farthest that a margin can be from the full model's, in nats.

@@ -1,11 +1,14 @@
 //! The optional sections: checked once, then found by their tags.
 
-use super::{HAS_OUTPUTS, HAS_SENTINEL, HAS_SEQUENCES, HAS_SHARED_LEAVES, HAS_STRANGERS, HAS_WEIGHTS, MARKS, Stated};
+use super::{
+    HAS_OUTPUTS, HAS_ROW_EVIDENCE, HAS_SENTINEL, HAS_SEQUENCES, HAS_SHARED_LEAVES, HAS_STRANGERS, HAS_WEIGHTS, MARKS,
+    Stated,
+};
 use crate::bytes::Wrong;
 use crate::layouts::{Sections, built_in};
 use palpate_shared::format::{
-    Guard, OddsByObject, Outputs, Plan, Position, Prediction, Section, Sentinel, SharedLeaves, Strangers, Tag,
-    TrainedNoise, TrainedProbe, TrainedTouches, Weights, take_section,
+    Guard, OddsByObject, Outputs, Plan, Position, Prediction, RowEvidence, Section, Sentinel, SharedLeaves, Strangers,
+    Tag, TrainedNoise, TrainedProbe, TrainedTouches, Weights, take_section,
 };
 
 /// The content of the section with this tag; empty if there is none; no section that is read is empty.
@@ -51,9 +54,14 @@ pub(super) fn check(model: &Sections<'_>, mut rest: &[u8], stated: &mut Stated) 
                 stated.by_object |= HAS_SENTINEL;
                 Sentinel::from_bytes(content).is_some()
             }
-            _ if cfg!(feature = "weights") && tag == Tag::Weights.code() => {
+            _ if cfg!(feature = "row-evidence") && tag == Tag::Weights.code() => {
                 stated.by_object |= HAS_WEIGHTS;
                 Weights::from_bytes(content).is_some()
+            }
+            // Touches have margins that are log-probabilities.
+            _ if cfg!(feature = "row-evidence") && tag == Tag::RowEvidence.code() => {
+                stated.by_object |= HAS_ROW_EVIDENCE;
+                RowEvidence::from_bytes(content).is_some() && stated.descriptor.is_none()
             }
             _ if cfg!(feature = "outputs") && tag == Tag::Outputs.code() => {
                 stated.by_object |= HAS_OUTPUTS;

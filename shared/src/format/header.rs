@@ -108,8 +108,7 @@ fields! {
     leaves, with_leaves: u32 = 28;
     /// Nats in one unit of a margin.
     unit, with_unit: f32 = 32;
-    /// Bits (log2 e nats) of evidence in one unit: this times 2^-`unit_shift`, in Q32. They are those of [`unit`](Header::unit)
-    /// unless a calibration on rows scaled the evidence.
+    /// Bits (log2 e nats) in one unit: this times 2^-`unit_shift`, in Q32.
     unit_bits, with_unit_bits: u32 = 36;
     /// See [`unit_bits`](Header::unit_bits).
     unit_shift, with_unit_shift: u8 = 40;

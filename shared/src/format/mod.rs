@@ -21,7 +21,7 @@ mod trained;
 
 pub use crate::checksum::checksum;
 pub use codes::{Counted, Key, Layout, LeafType, Length, MAPS_LAYOUT, Per, RAW_FEATURES};
-pub use evidence::Weights;
+pub use evidence::{RowEvidence, Shifts, Weights};
 pub use header::{HEADER_LENGTH, Header, HeaderBuilder, MAGIC, VERSION};
 pub use key::f32_key;
 pub use leaves::SharedLeaves;

@@ -38,6 +38,8 @@ pub enum Tag {
     Sentinel,
     /// [`Fingerprints`].
     Fingerprints,
+    /// Evidence of a row by its margins: [`RowEvidence`](super::RowEvidence).
+    RowEvidence,
     /// Outputs that belong to one object: [`Outputs`](super::Outputs).
     Outputs,
     /// Columns of the library's rows that a model over some of them has: how many there were, and the number of each, as u32.
@@ -69,6 +71,7 @@ impl Tag {
             Self::Prediction => 13,
             Self::Sentinel => 14,
             Self::Fingerprints => 15,
+            Self::RowEvidence => 16,
             Self::Outputs => 18,
             Self::Columns => 19,
             Self::Maps => 20,

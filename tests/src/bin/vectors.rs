@@ -249,13 +249,13 @@ fn rows(text: &mut String) {
         play_rows(text, &format!("rows of whole features, {}", layout.name()), &changed(&bytes, 13, &[0]), false);
     }
     let weights = [65_535_u16, 0, 20_000, 9_000].map(u16::to_le_bytes).concat();
-    let sections = section(4 | 1 << 15, &[&[4, 0][..], &weights].concat());
+    let values: Vec<u8> = (0..33).map(|value| 7 * value).collect();
+    let table = [&(-(1_i32 << 17)).to_le_bytes()[..], &[3, 10, 2, 32], &values].concat();
+    let sections = [section(4 | 1 << 15, &[&[4, 0][..], &weights].concat()), section(16 | 1 << 15, &table)].concat();
     let settings = with!(Settings::default(), leaf = Leaf::I16);
     let bytes =
         compile(&random::over_rows(random::ensemble(SHAPE, 14), 5, 1.000_001e-3), &settings).expect("it fits").bytes;
-    let bytes = with_sections(&bytes, &sections);
-    let scaled = changed(&bytes, 36, &[1, 2, 3, 0x90, bytes[40].saturating_sub(2)]);
-    play_rows(text, "rows whose evidence is weighed, and scaled", &scaled, true);
+    play_rows(text, "rows whose evidence is weighed, by a table", &with_sections(&bytes, &sections), true);
 }
 
 fn play_rows(text: &mut String, name: &str, bytes: &[u8], real: bool) {

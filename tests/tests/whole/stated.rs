@@ -148,7 +148,7 @@ const C_ROWS: [(&str, &str); 5] = [
 ];
 
 /// Macros of all of these rows.
-const C_LEFT_OUT: [&str; 3] = ["-DPALPATE_SHARED=0", "-DPALPATE_SENTINEL=0", "-DPALPATE_WEIGHTS=0"];
+const C_LEFT_OUT: [&str; 3] = ["-DPALPATE_SHARED=0", "-DPALPATE_SENTINEL=0", "-DPALPATE_ROW_EVIDENCE=0"];
 
 /// The columns of instructions: tools, flags, emulator.
 const C_EMULATORS: [(usize, &str, &str, &str); 2] = [

@@ -322,15 +322,15 @@ fn shape(of: &OfRows) -> String {
         };
         let rows = |rows: Option<f64>| rows.map_or_else(|| "no threshold".into(), |rows| format!("{rows:.1} rows"));
         let what = if kept { "used" } else { "not used" };
-        format!("{what} ({} with, {} without, on held-back sequences)", rows(rows_with), rows(rows_without))
+        format!("{what} ({} with them, {} without, on held-back sequences)", rows(rows_with), rows(rows_without))
     };
     let weights = of.weights_by_doubling.as_ref().map_or_else(String::new, |weights| {
         let each = (0..).zip(weights).map(|(doubling, weight)| format!("{} × {weight:.2}", 1_u32 << doubling));
         format!("\n  rows × weight: {}", each.collect::<Vec<_>>().join(", "))
     });
     format!(
-        "Learned scale of the evidence: {}\nLearned weights, smaller for later rows: {}{weights}\n",
-        gain(of.scale),
+        "Learned evidence table: {}\nLearned weights, smaller for later rows: {}{weights}\n",
+        gain(of.row_evidence),
         gain(of.weights)
     )
 }

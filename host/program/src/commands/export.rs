@@ -118,7 +118,7 @@ struct Exported {
     /// The prediction of a model over rows.
     #[serde(skip_serializing_if = "Option::is_none")]
     predicts: Option<Predicts>,
-    /// Features of which rows go another way in f32 than in the library.
+    /// Features whose values can send a row another way in f32 than in the library.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     in_f32: Vec<Single>,
     /// The kind of file, if another library wrote it.

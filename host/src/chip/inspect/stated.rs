@@ -307,7 +307,7 @@ pub(super) fn promised(model: &Model<'_>) -> Option<Promised> {
 
 pub(super) fn priors<'a>(model: &Model<'a>) -> Option<BTreeMap<&'a str, f64>> {
     let objects = 0..model.object_count();
-    let prior = |object| f64::from(model.prior(object)) * model.evidence_unit();
+    let prior = |object| f64::from(model.prior(object)) * f64::from(model.unit());
     let is_flat = objects.clone().all(|object| model.prior(object) == model.prior(0));
     (!is_flat).then(|| objects.map(|object| (model.object_name(object), prior(object))).collect())
 }

@@ -70,7 +70,7 @@ impl Calls<'_> {
         let Places { parts, cuts } = Places::of(bytes);
         let at = |place: usize| format!("{name}_model + {place}");
         let mut found: [Option<usize>; 24] = [None; 24];
-        let (mut place, mut known) = (parts[1], self.model.object_count());
+        let (mut place, mut row, mut known) = (parts[1], (0, 0), self.model.object_count());
         // Without a section of what was trained: all times, of any spread, and directions if the descriptor has them.
         let mut trained = (0x20, u8::from(self.is_oriented()), u32::MAX);
         while place < parts[2] {
@@ -81,6 +81,10 @@ impl Calls<'_> {
             match tag & 0x7fff {
                 2 => trained = (bytes[content], bytes[content + 2], long(bytes, content + 4)),
                 6 => known -= usize::from(bytes[content]),
+                16 => {
+                    let most = (u32::from(bytes[content + 7]) << bytes[content + 5]) - 1;
+                    row = (long(bytes, content).cast_signed(), most);
+                }
                 _ => {}
             }
             place = content + length.next_multiple_of(4);
@@ -90,7 +94,7 @@ impl Calls<'_> {
         format!(
             "/* The model as palpate_open leaves it: its bytes were checked when it was exported. */\n\
              static const palpate_model {name}_opened_ = {{\n    {name}_model,\n    {{{parts}}},\n    \
-             {cuts}, {odds}, {strangers}, {table}, {sentinel}, {weights},\n\
+             {cuts}, {odds}, {strangers}, {table}, {sentinel}, {weights}, {rows}, {start}, {most}u,\n\
              #if PALPATE_SEQUENCES\n    {position}, {guard},\n#endif\n\
              #if PALPATE_OUTPUTS\n    {outputs},\n#endif\n    \
              0, {spread}u, {objects}, {known}, {features}, {layout}, {leaf}, {descriptor}, {real}, {patterns}, {oriented}\n\
@@ -102,6 +106,9 @@ impl Calls<'_> {
             table = pointer(12, 4),
             sentinel = pointer(14, 0),
             weights = pointer(4, 0),
+            rows = pointer(16, 0),
+            start = row.0,
+            most = row.1,
             position = pointer(21, 0),
             guard = pointer(22, 0),
             outputs = pointer(18, 0),

@@ -153,7 +153,7 @@ fn c(legend: &Legend<'_>, name: &str, probability: Probability, code: Option<&Pr
     let strangers = u8::from(model.strangers().is_some());
     let shared = u8::from(model.shared_leaves().is_some());
     let sentinel = u8::from(model.sentinel().is_some());
-    let weights = u8::from(has_weights(model));
+    let row_evidence = u8::from(has_row_evidence(model));
     let has_outputs = model.outputs().is_some();
     let outputs = if has_outputs { "#ifndef PALPATE_OUTPUTS\n#define PALPATE_OUTPUTS 1\n#endif\n" } else { "" };
     let has_sequences = has_sequences(model);
@@ -162,7 +162,7 @@ fn c(legend: &Legend<'_>, name: &str, probability: Probability, code: Option<&Pr
         ("PALPATE_STRANGERS", strangers),
         ("PALPATE_SHARED", shared),
         ("PALPATE_SENTINEL", sentinel),
-        ("PALPATE_WEIGHTS", weights),
+        ("PALPATE_ROW_EVIDENCE", row_evidence),
         ("PALPATE_SEQUENCES", u8::from(has_sequences)),
         ("PALPATE_OUTPUTS", u8::from(has_outputs)),
     ];
@@ -177,7 +177,7 @@ fn c(legend: &Legend<'_>, name: &str, probability: Probability, code: Option<&Pr
          #ifndef PALPATE_STRANGERS\n#define PALPATE_STRANGERS {strangers}\n#endif\n\
          #ifndef PALPATE_SHARED\n#define PALPATE_SHARED {shared}\n#endif\n\
          #ifndef PALPATE_SENTINEL\n#define PALPATE_SENTINEL {sentinel}\n#endif\n\
-         #ifndef PALPATE_WEIGHTS\n#define PALPATE_WEIGHTS {weights}\n#endif\n\
+         #ifndef PALPATE_ROW_EVIDENCE\n#define PALPATE_ROW_EVIDENCE {row_evidence}\n#endif\n\
          {sequences}{outputs}{too_long}\
          #ifndef PALPATE_MAX_OBJECTS\n#define PALPATE_MAX_OBJECTS {objects}\n#endif\n\
          #if defined(__AVR__) && !defined(PALPATE_BYTE)\n#include <avr/pgmspace.h>\n#define PALPATE_BYTE(p) pgm_read_byte(p)\n#endif\n\
@@ -233,7 +233,7 @@ fn checks(name: &str, layout: &str, leaf: &str, needed: &[(&str, u8)], objects: 
 fn rust(legend: &Legend<'_>, name: &str) -> String {
     let model = legend.model;
     format!(
-        "// {about}\n// Written by `palpate export`; not to be edited. Features of palpate-onboard: {layout}, {leaf}-leaves{shared}{sentinel}{weights}{sequences}.\n\n\
+        "// {about}\n// Written by `palpate export`; not to be edited. Features of palpate-onboard: {layout}, {leaf}-leaves{shared}{sentinel}{row}{sequences}.\n\n\
          /// The model: `Model::new(&{constant}.0)`.\n\
          #[rustfmt::skip]\n\
          pub static {constant}: palpate_onboard::Aligned<[u8; {length}]> = palpate_onboard::Aligned([\n\
@@ -244,7 +244,7 @@ fn rust(legend: &Legend<'_>, name: &str) -> String {
         leaf = model.leaf_type().name(),
         shared = if model.shared_leaves().is_some() { ", shared-leaves" } else { "" },
         sentinel = if model.sentinel().is_some() { ", sentinel" } else { "" },
-        weights = if has_weights(model) { ", weights" } else { "" },
+        row = if has_row_evidence(model) { ", row-evidence" } else { "" },
         sequences = if has_sequences(model) { ", sequences" } else { "" },
         constant = name.to_uppercase(),
         length = model.bytes().len(),
@@ -252,9 +252,10 @@ fn rust(legend: &Legend<'_>, name: &str) -> String {
     )
 }
 
-/// True if the model states how much rows count together.
-fn has_weights(model: &Model<'_>) -> bool {
-    model.optional_sections().any(|section| section.tag == Tag::Weights.code())
+/// True if the model states what a row adds to the evidence, or how much rows count together.
+fn has_row_evidence(model: &Model<'_>) -> bool {
+    let tags = [Tag::Weights, Tag::RowEvidence].map(Tag::code);
+    model.optional_sections().any(|section| tags.contains(&section.tag))
 }
 
 /// Description of the model, in one line.

@@ -14,8 +14,6 @@ pub struct Restated {
     pub max_touches: Option<u32>,
     /// The evidence for each object before the first step, in units.
     pub priors: Option<Vec<i32>>,
-    /// Nats of evidence in a unit of a margin, from 2^-24 to 0.5.
-    pub evidence_unit: Option<f64>,
     /// Sections to write instead of those with their tags: whether they have to be understood, and their content. `None`
     /// removes a section.
     pub sections: Vec<RestatedSection>,
@@ -43,10 +41,6 @@ pub fn restate(model: &Model<'_>, restated: &Restated) -> Result<Vec<u8>> {
         .header
         .with_odds(restated.odds.unwrap_or(header.odds()))
         .with_max_touches(restated.max_touches.unwrap_or(header.max_touches()));
-    if let Some(unit) = restated.evidence_unit {
-        let (bits, shift) = super::write::unit_bits(unit);
-        container.header = container.header.with_unit_bits(bits).with_unit_shift(shift);
-    }
     if let Some(priors) = &restated.priors {
         // After as many starting values of the margins.
         let priors_start = 4 * model.object_count();

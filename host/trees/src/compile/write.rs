@@ -23,7 +23,7 @@ pub(super) fn write(
     parts: &Parts,
 ) -> Result<Vec<u8>> {
     let priors = priors(settings, forest.objects(), parts.unit)?;
-    let (unit_bits, unit_shift) = unit_bits(parts.unit.into());
+    let (unit_bits, unit_shift) = unit_bits(parts.unit);
     let header = HeaderBuilder::default()
         .with_layout(layout.code())
         .with_leaf(settings.leaf.code())
@@ -171,10 +171,10 @@ fn priors(settings: &Settings, objects: usize, unit: f32) -> Result<Vec<i32>> {
 }
 
 /// A unit in bits, in Q32, as a number of 32 binary digits and a shift.
-pub(super) fn unit_bits(unit: f64) -> (u32, u8) {
-    let bits = unit * std::f64::consts::LOG2_E * 4_294_967_296.0;
-    // Units are from 2^-24 to 0.5 nats, so the shift is from 0 to 23.
-    let shift = (0..=23_u8).rev().find(|&shift| bits * f64::from(shift).exp2() < 4_294_967_295.0).unwrap_or(0);
+fn unit_bits(unit: f32) -> (u32, u8) {
+    let bits = f64::from(unit) * std::f64::consts::LOG2_E * 4_294_967_296.0;
+    // Units are from 2^-24 to 0.5 nats, so the shift is from 1 to 32.
+    let shift = (0..=63_u8).rev().find(|&shift| bits * f64::from(shift).exp2() < 4_294_967_295.0).unwrap_or(0);
     ((bits * f64::from(shift).exp2()).round() as u32, shift)
 }
 

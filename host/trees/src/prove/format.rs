@@ -232,8 +232,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
     let unit = f64::from(header.float()?);
     let (unit_bits, unit_shift) = (header.number(4)? as f64, f64::from(header.byte()?));
     header.take(3)?;
-    if unit_bits < 2_f64.powi(31) || unit_shift > 23.0 {
-        return Err(ProofProblem::Format { what: "a unit of evidence beyond its limits" });
+    if (unit * std::f64::consts::LOG2_E * (32.0 + unit_shift).exp2() - unit_bits).abs() > 1.0 {
+        return Err(ProofProblem::Format { what: "its unit in nats is not its unit in bits" });
     }
     let error = f64::from(header.float()?);
     header.take(20)?;

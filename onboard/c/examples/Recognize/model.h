@@ -22,8 +22,8 @@
 #ifndef PALPATE_SENTINEL
 #define PALPATE_SENTINEL 0
 #endif
-#ifndef PALPATE_WEIGHTS
-#define PALPATE_WEIGHTS 0
+#ifndef PALPATE_ROW_EVIDENCE
+#define PALPATE_ROW_EVIDENCE 0
 #endif
 #ifndef PALPATE_MAX_OBJECTS
 #define PALPATE_MAX_OBJECTS 2
@@ -67,7 +67,7 @@ static const uint8_t model_model[173]
 static const palpate_model model_opened_ = {
     model_model,
     {model_model + 96, model_model + 107, model_model + 107, model_model + 123, model_model + 138, model_model + 146, model_model + 159, model_model + 169},
-    model_model + 131, NULL, NULL, NULL, NULL, NULL,
+    model_model + 131, NULL, NULL, NULL, NULL, NULL, NULL, 0, 0u,
 #if PALPATE_SEQUENCES
     NULL, NULL,
 #endif
