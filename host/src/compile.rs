@@ -30,7 +30,7 @@ pub fn usual(ensemble: &Ensemble) -> Settings {
 /// Whole weights of objects, for [`Recognizer::reset_to`](palpate_onboard::Recognizer::reset_to), from numbers in any unit.
 ///
 /// # Errors
-/// [`Setting`](crate::error::Setting) unless they are finite, none is below 0, and one is above.
+/// [`Kind::Setting`](crate::error::Kind::Setting) unless they are finite, none is below 0, and one is above.
 pub fn weights(weights: &[f64]) -> Result<Vec<u32>> {
     let most = weights.iter().copied().fold(0.0, f64::max);
     if most <= 0.0 || !weights.iter().all(|weight| *weight >= 0.0 && weight.is_finite()) {

@@ -1,8 +1,10 @@
-//! Errors, with the place and a remedy.
+//! One error: what is wrong, where, and what to do.
 
 use std::any::Any;
 use std::fmt;
 use std::path::{Path, PathBuf};
+
+pub use crate::problem;
 
 /// The result of everything fallible on the host's side.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -51,125 +53,205 @@ impl fmt::Display for Place {
     }
 }
 
-/// Something that is wrong with what was given. Each room has an enum of its own, with a variant for whatever a caller may
-/// act on. Its `Display` says what is wrong, without a full stop.
-pub trait Problem: std::error::Error + Any + Send + Sync {
-    /// Remedy, as a sentence.
-    fn fix(&self) -> String;
-
-    /// The exit code of a program that ends with it: 1 for bad input, 2 for bad arguments.
-    fn exit_code(&self) -> u8 {
-        1
-    }
-}
-
-/// A setting is out of its range: a mistake of the caller, not of the data.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{name} is {value}")]
-pub struct Setting {
-    /// The setting's name: the field in its `Settings`.
-    pub name: &'static str,
-    /// Value that was given.
-    pub value: String,
-    /// Values allowed: "1 to 10000".
-    pub allowed: String,
-}
-
-impl Problem for Setting {
-    fn fix(&self) -> String {
-        format!("Use {}.", self.allowed)
-    }
-
-    fn exit_code(&self) -> u8 {
-        2
-    }
-}
-
-/// An error: where it is, what is wrong, what to do.
-#[derive(Debug, thiserror::Error)]
-pub enum Error {
-    /// The operating system refused to read or write a file.
-    #[error("{}: cannot {action}: {source}. {fix}", path.display())]
-    Io {
-        /// The file or directory.
-        path: PathBuf,
-        /// Action that failed, as an infinitive: "read the mesh".
-        action: &'static str,
-        /// The operating system's message.
-        source: std::io::Error,
-        /// Remedy, as a sentence.
-        fix: String,
+/// What a caller may act on: Python picks an exception by it, and a program its exit code. Texts are for people alone.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Kind {
+    /// Something is wrong with what was given, and nothing that a caller could do about it differs from the rest.
+    #[default]
+    Input,
+    /// A setting is out of its range: a mistake of the caller, not of the data.
+    Setting {
+        /// The setting's name: the field in its `Settings`.
+        name: &'static str,
+        /// Value that was given.
+        value: String,
+        /// Values allowed: "1 to 10000".
+        allowed: String,
     },
-    /// Something is wrong with what was given.
-    #[error("{place}{problem}. {}", problem.fix())]
-    At {
-        /// Its place.
-        place: Place,
-        /// The problem.
-        problem: Box<dyn Problem>,
-    },
+    /// The operating system refused to read or write.
+    Io,
     /// The caller cancelled the work through its [`Progress`](crate::progress::Progress).
-    #[error("cancelled")]
     Cancelled,
     /// Standard output was closed by its reader (`palpate … | head`): not an error for the user.
-    #[error("standard output was closed")]
     Closed,
 }
 
-/// A problem that no path names.
-impl<P: Problem> From<P> for Error {
+/// A problem as a value: where it is, what is wrong, what to do. It is made where it arises:
+///
+/// ```
+/// use palpate_base::error::Place;
+/// use palpate_base::problem;
+///
+/// let error = problem!("{} fields where a touch has 3", 5).fix("Give three times.").at(Place::line("bowl.txt", 7));
+/// assert_eq!(error.to_string(), "bowl.txt:7: 5 fields where a touch has 3. Give three times.");
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Error(Box<Parts>);
+
+#[derive(Clone, Debug, Default)]
+struct Parts {
+    kind: Kind,
+    place: Place,
+    what: String,
+    fix: String,
+    variant: Option<std::sync::Arc<dyn Variant>>,
+}
+
+impl PartialEq for Parts {
+    fn eq(&self, other: &Self) -> bool {
+        (&self.kind, &self.place, &self.what, &self.fix) == (&other.kind, &other.place, &other.what, &other.fix)
+    }
+}
+
+/// To go: a variant of a room's enum of problems.
+pub trait Variant: std::error::Error + Any + Send + Sync {
+    /// Remedy, as a sentence.
+    fn fix(&self) -> String;
+}
+
+/// To go with the enums.
+impl<P: Variant> From<P> for Error {
     fn from(problem: P) -> Self {
-        Self::at(Place::Nowhere, problem)
+        Self(Box::new(Parts {
+            what: problem.to_string(),
+            fix: problem.fix(),
+            variant: Some(std::sync::Arc::new(problem)),
+            ..Parts::default()
+        }))
+    }
+}
+
+/// An [`Error`] of kind [`Kind::Input`] that says what is wrong, in the words of [`format!`], without a full stop.
+#[macro_export]
+macro_rules! problem {
+    ($($what:tt)*) => { $crate::error::Error::new(format!($($what)*)) };
+}
+
+impl std::error::Error for Error {}
+
+/// The place, what is wrong, and the remedy.
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Parts { place, what, fix, .. } = &*self.0;
+        write!(f, "{place}{what}{}{fix}", if fix.is_empty() { "" } else { ". " })
     }
 }
 
 impl Error {
-    /// Something is wrong at a place.
-    pub fn at(place: Place, problem: impl Problem) -> Self {
-        Self::At { place, problem: Box::new(problem) }
+    /// Something is wrong with what was given.
+    pub fn new(what: impl Into<String>) -> Self {
+        Self(Box::new(Parts { what: what.into(), ..Parts::default() }))
+    }
+
+    /// To go with the enums.
+    pub fn variant_at(place: Place, problem: impl Variant) -> Self {
+        Self::from(problem).at(place)
+    }
+
+    /// To go with the enums.
+    pub fn problem<P: Variant>(&self) -> Option<&P> {
+        (self.0.variant.as_deref()? as &dyn Any).downcast_ref()
     }
 
     /// The setting `name` is `value`, which is not among what is `allowed` ("1 to 10000").
     pub fn setting(name: &'static str, value: impl fmt::Display, allowed: impl Into<String>) -> Self {
-        Setting { name, value: value.to_string(), allowed: allowed.into() }.into()
-    }
-
-    /// The problem, if it is of this kind: `error.problem::<Setting>()`.
-    pub fn problem<P: Problem>(&self) -> Option<&P> {
-        match self {
-            Self::At { problem, .. } => (problem.as_ref() as &dyn Any).downcast_ref(),
-            _ => None,
-        }
+        let (value, allowed) = (value.to_string(), allowed.into());
+        problem!("{name} is {value}").fix(format!("Use {allowed}.")).as_kind(Kind::Setting { name, value, allowed })
     }
 
     /// The operating system refused `action` (an infinitive) on `path`; the fix follows from the kind of refusal.
-    pub fn io(path: impl AsRef<Path>, action: &'static str, source: std::io::Error) -> Self {
+    pub fn io(path: impl AsRef<Path>, action: &str, source: std::io::Error) -> Self {
         use std::io::ErrorKind;
         let fix = match source.kind() {
-            ErrorKind::NotFound => "Check the path",
-            ErrorKind::PermissionDenied => "Check the permissions, or choose another place",
-            ErrorKind::StorageFull | ErrorKind::QuotaExceeded => "Free some space, then run the command again",
-            ErrorKind::IsADirectory => "Give a file, not a directory",
-            ErrorKind::NotADirectory | ErrorKind::AlreadyExists => "Give a directory, not a file",
-            ErrorKind::InvalidData => "Check that it is the right kind of file",
-            _ => "Check the file and the disk it is on",
+            ErrorKind::NotFound => "Check the path.",
+            ErrorKind::PermissionDenied => "Check the permissions, or choose another place.",
+            ErrorKind::StorageFull | ErrorKind::QuotaExceeded => "Free some space, then run the command again.",
+            ErrorKind::IsADirectory => "Give a file, not a directory.",
+            ErrorKind::NotADirectory | ErrorKind::AlreadyExists => "Give a directory, not a file.",
+            ErrorKind::InvalidData => "Check that it is the right kind of file.",
+            _ => "Check the file and the disk it is on.",
         };
-        Self::Io { path: path.as_ref().into(), action, source, fix: format!("{fix}.") }
+        Self::new(format!("cannot {action}: {source}")).fix(fix).as_kind(Kind::Io).at(Place::file(path))
     }
 
-    /// Says which file wrong data came from; other errors stay as they are.
+    /// The caller cancelled the work.
+    pub fn cancelled() -> Self {
+        Self::new("cancelled").as_kind(Kind::Cancelled)
+    }
+
+    /// The reader of standard output went away.
+    pub fn closed() -> Self {
+        Self::new("standard output was closed").as_kind(Kind::Closed)
+    }
+
+    /// The same with this remedy, a sentence.
+    #[must_use]
+    pub fn fix(mut self, fix: impl Into<String>) -> Self {
+        self.0.fix = fix.into();
+        self
+    }
+
+    /// The same at this place.
+    #[must_use]
+    pub fn at(mut self, place: Place) -> Self {
+        self.0.place = place;
+        self
+    }
+
+    /// The same as a problem of this kind.
+    #[must_use]
+    pub fn as_kind(mut self, kind: Kind) -> Self {
+        self.0.kind = kind;
+        self
+    }
+
+    /// The same with `part` before what is wrong: "row 3: ".
+    #[must_use]
+    pub fn within(mut self, part: impl fmt::Display) -> Self {
+        self.0.what.insert_str(0, &part.to_string());
+        self
+    }
+
+    /// Says which file wrong data came from; a problem that has a place stays as it is.
+    #[must_use]
     pub fn in_file(self, path: impl AsRef<Path>) -> Self {
-        match self {
-            Self::At { place: Place::Nowhere, problem } => Self::At { place: Place::file(path), problem },
-            other => other,
+        match self.place() {
+            Place::Nowhere if self.exit_code() > 0 && !self.is(&Kind::Cancelled) => self.at(Place::file(path)),
+            _ => self,
         }
+    }
+
+    /// What a caller may act on.
+    pub fn kind(&self) -> &Kind {
+        &self.0.kind
+    }
+
+    /// True for a problem of this kind.
+    pub fn is(&self, kind: &Kind) -> bool {
+        self.0.kind == *kind
+    }
+
+    /// Where it is.
+    pub fn place(&self) -> &Place {
+        &self.0.place
+    }
+
+    /// What is wrong, without place and remedy.
+    pub fn what(&self) -> &str {
+        &self.0.what
+    }
+
+    /// What to do, as a sentence.
+    pub fn remedy(&self) -> &str {
+        &self.0.fix
     }
 
     /// The program's exit code: 1 for bad input, 2 for bad arguments, 0 when the reader of stdout went away.
     pub fn exit_code(&self) -> u8 {
-        match self {
-            Self::At { problem, .. } => problem.exit_code(),
-            Self::Closed => 0,
+        match self.kind() {
+            Kind::Setting { .. } => 2,
+            Kind::Closed => 0,
             _ => 1,
         }
     }

@@ -14,7 +14,7 @@ const SUFFIX: &str = ".tmp";
 /// writing into it.
 ///
 /// # Errors
-/// [`Error::Io`] naming the directory or the file.
+/// [`Kind::Io`](crate::error::Kind::Io) naming the directory or the file.
 pub fn remove_leftovers(directory: &Path) -> Result<()> {
     for entry in std::fs::read_dir(directory).map_err(|error| Error::io(directory, "list", error))? {
         let entry = entry.map_err(|error| Error::io(directory, "list", error))?;
@@ -30,7 +30,7 @@ pub fn remove_leftovers(directory: &Path) -> Result<()> {
 /// lock back when the file is closed, even from a process that is killed.
 ///
 /// # Errors
-/// [`Error::Io`] naming the file.
+/// [`Kind::Io`](crate::error::Kind::Io) naming the file.
 pub fn lock(directory: &Path) -> Result<Option<File>> {
     let path = directory.join(".lock");
     let io = |error| Error::io(&path, "lock the directory", error);
@@ -95,7 +95,7 @@ pub fn is_stdout(path: &Path) -> bool {
 /// output.
 ///
 /// # Errors
-/// Errors of `fill`; [`Error::Io`] naming `path`; [`Error::Closed`] if the reader of standard output went away.
+/// Errors of `fill`; [`Kind::Io`](crate::error::Kind::Io) naming `path`; [`Kind::Closed`](crate::error::Kind::Closed) if the reader of standard output went away.
 pub fn write_whole(path: &Path, fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
     let io = |source| Error::io(path, "write", source);
     match target(path).map_err(io)? {
@@ -141,7 +141,7 @@ impl Folder {
     /// Begins what is to become the directory `place`; missing directories above it are made.
     ///
     /// # Errors
-    /// [`Setting`](crate::error::Setting), `output`, if the program runs in that directory; [`Error::Io`] naming it.
+    /// [`Kind::Setting`](crate::error::Kind::Setting), `output`, if the program runs in that directory; [`Kind::Io`](crate::error::Kind::Io) naming it.
     pub fn begin(place: &Path) -> Result<Self> {
         let io = |error| Error::io(place, "make the directory", error);
         // A symbolic link stays one.
@@ -172,7 +172,7 @@ impl Folder {
     /// Puts the directory in its place. Of one that is there, these files are removed, and others stay.
     ///
     /// # Errors
-    /// [`Error::Io`] naming the directory.
+    /// [`Kind::Io`](crate::error::Kind::Io) naming the directory.
     pub fn finish(self, replaced: &[String]) -> Result<()> {
         let Self { unfinished, place } = self;
         let put = || {
@@ -198,7 +198,7 @@ impl Folder {
 /// Refuses to write onto what is being read, before any work is done: the file `output` must be none of the `inputs`.
 ///
 /// # Errors
-/// [`Setting`](crate::error::Setting), `output`.
+/// [`Kind::Setting`](crate::error::Kind::Setting), `output`.
 pub fn admit<P: AsRef<Path>>(output: &Path, inputs: impl IntoIterator<Item = P>) -> Result<()> {
     let Ok(written) = output.canonicalize() else { return Ok(()) };
     let is_written = |input: P| written.is_file() && input.as_ref().canonicalize().is_ok_and(|input| input == written);
@@ -211,7 +211,7 @@ pub fn admit<P: AsRef<Path>>(output: &Path, inputs: impl IntoIterator<Item = P>)
 /// Refuses `-` where a directory belongs.
 ///
 /// # Errors
-/// [`Setting`](crate::error::Setting), `output`.
+/// [`Kind::Setting`](crate::error::Kind::Setting), `output`.
 pub fn refuse_stdout(directory: &Path) -> Result<()> {
     if is_stdout(directory) {
         return Err(Error::setting("output", "standard output", "a directory: several files are written"));
@@ -222,7 +222,7 @@ pub fn refuse_stdout(directory: &Path) -> Result<()> {
 /// Writes `bytes` to `path` as [`write_whole`] does.
 ///
 /// # Errors
-/// [`Error::Io`] naming `path`.
+/// [`Kind::Io`](crate::error::Kind::Io) naming `path`.
 pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
     write_whole(path, |out| out.write_all(bytes))
 }
@@ -238,10 +238,10 @@ pub fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
     })
 }
 
-/// Prints to standard output; a reader that went away is [`Error::Closed`].
+/// Prints to standard output; a reader that went away is [`Kind::Closed`](crate::error::Kind::Closed).
 ///
 /// # Errors
-/// [`Error::Closed`], or [`Error::Io`].
+/// [`Kind::Closed`](crate::error::Kind::Closed), or [`Kind::Io`](crate::error::Kind::Io).
 pub fn print(text: &str) -> Result<()> {
     HAS_PRINTED.store(true, Ordering::Relaxed);
     let mut out = std::io::stdout().lock();
@@ -258,7 +258,7 @@ pub fn has_printed() -> bool {
 
 fn to_stdout(source: std::io::Error) -> Error {
     match source.kind() {
-        ErrorKind::BrokenPipe => Error::Closed,
+        ErrorKind::BrokenPipe => Error::closed(),
         _ => Error::io("standard output", "write", source),
     }
 }

@@ -18,7 +18,7 @@ pub trait Progress: Sync {
         _ = steps;
     }
 
-    /// True if the call should stop as soon as it can, with [`Error::Cancelled`]. Asked often; should be cheap.
+    /// True if the call should stop as soon as it can, with [`Kind::Cancelled`](crate::error::Kind::Cancelled). Asked often; should be cheap.
     fn is_cancelled(&self) -> bool {
         false
     }
@@ -30,7 +30,7 @@ impl Progress for () {}
 /// The current stage has come `steps` further; stops the call if it was cancelled.
 ///
 /// # Errors
-/// [`Error::Cancelled`].
+/// [`Kind::Cancelled`](crate::error::Kind::Cancelled).
 pub fn advance(progress: &dyn Progress, steps: u64) -> Result<()> {
     progress.advance(steps);
     check(progress)
@@ -39,7 +39,7 @@ pub fn advance(progress: &dyn Progress, steps: u64) -> Result<()> {
 /// Stops the call if it was cancelled.
 ///
 /// # Errors
-/// [`Error::Cancelled`].
+/// [`Kind::Cancelled`](crate::error::Kind::Cancelled).
 pub fn check(progress: &dyn Progress) -> Result<()> {
-    if progress.is_cancelled() { Err(Error::Cancelled) } else { Ok(()) }
+    if progress.is_cancelled() { Err(Error::cancelled()) } else { Ok(()) }
 }

@@ -220,7 +220,7 @@ pub struct Recognition {
 ///
 /// # Errors
 /// [`ReportProblem::OtherResults`] if `out` holds results that were made from something else, unless
-/// [`Settings::replace`]; [`Error::Cancelled`](palpate::Error::Cancelled); and what capture, training, compiling,
+/// [`Settings::replace`]; [`Kind::Cancelled`](palpate::error::Kind::Cancelled); and what capture, training, compiling,
 /// evaluating or writing return.
 pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn Progress) -> Result<Summary> {
     let began = Instant::now();
@@ -485,7 +485,7 @@ mod tests {
     mod several_meshes;
 
     use super::*;
-    use palpate::error::Error;
+    use palpate::error::Kind;
     use palpate::mesh::Mesh;
 
     fn objects() -> Vec<Object> {
@@ -587,7 +587,7 @@ mod tests {
         }
         let place = tempfile::tempdir().unwrap();
         let error = run(&objects(), &settings(100), place.path(), &Cancelled).unwrap_err();
-        assert!(matches!(error, Error::Cancelled), "{error}");
+        assert!(error.is(&Kind::Cancelled), "{error}");
         assert!(!place.path().join("summary.json").exists());
     }
 }

@@ -1,6 +1,6 @@
 //! Errors of the library as exceptions of `palpate._errors`, with the same text.
 
-use palpate::error::{Error, Place, Setting};
+use palpate::error::{Error, Kind, Place};
 use pyo3::prelude::*;
 use std::ffi::CString;
 use std::path::PathBuf;
@@ -42,18 +42,17 @@ pub(crate) fn note_of(py: Python<'_>, text: &str) -> PyResult<()> {
 }
 
 fn exception(py: Python<'_>, error: &Error) -> PyResult<PyErr> {
-    let place: (Option<PathBuf>, Option<u64>) = match error {
-        Error::Io { path, .. } => (Some(path.clone()), None),
-        Error::At { place: Place::File(path) | Place::Byte(path, _), .. } => (Some(path.clone()), None),
-        Error::At { place: Place::Line(path, line), .. } => (Some(path.clone()), Some(*line)),
+    let (path, line): (Option<PathBuf>, Option<u64>) = match error.place() {
+        Place::File(path) | Place::Byte(path, _) => (Some(path.clone()), None),
+        Place::Line(path, line) => (Some(path.clone()), Some(*line)),
         _ => (None, None),
     };
-    let name = match error {
-        Error::Io { .. } => "FileError",
-        error if error.problem::<Setting>().is_some() => "SettingError",
-        Error::At { .. } => "InputError",
-        _ => "PalpateError",
+    let name = match error.kind() {
+        Kind::Io => "FileError",
+        Kind::Setting { .. } => "SettingError",
+        Kind::Cancelled | Kind::Closed => "PalpateError",
+        _ => "InputError",
     };
     let class = py.import("palpate._errors")?.getattr(name)?;
-    Ok(PyErr::from_value(class.call1((error.to_string(), place.0, place.1))?))
+    Ok(PyErr::from_value(class.call1((error.to_string(), path, line))?))
 }

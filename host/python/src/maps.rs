@@ -145,7 +145,7 @@ impl Maps {
     fn load(py: Python<'_>, path: PathBuf) -> Result<Self, Failure> {
         Ok(py.detach(|| {
             std::fs::metadata(&path).map_err(|source| Error::io(&path, "read the maps", source))?;
-            let trees = || Error::at(Place::File(path.clone()), LocateProblem::Trees);
+            let trees = || Error::variant_at(Place::File(path.clone()), LocateProblem::Trees);
             let file = MapsFile::read(&path)?.ok_or_else(trees)?;
             Self::of(file.maps().model().to_vec())
         })?)

@@ -101,7 +101,6 @@ pub(crate) fn long<T: Send>(
                 told.tell(py, callback)?;
                 Ok(value)
             }
-            (None, Err(Error::Cancelled)) => Err(Error::Cancelled.into()),
             (None, Err(error)) => Err(error.into()),
         }
     })

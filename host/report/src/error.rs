@@ -1,6 +1,6 @@
 //! Problems with the report and the main job.
 
-use palpate::error::Problem;
+use palpate::error::Variant;
 
 /// Problems with the report and the main job.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -45,7 +45,7 @@ pub enum ReportProblem {
     },
 }
 
-impl Problem for ReportProblem {
+impl Variant for ReportProblem {
     fn fix(&self) -> String {
         match self {
             Self::OneObject => "Give at least two objects.",

@@ -16,10 +16,11 @@ const MADE_FROM: &str = "made_from";
 /// `trace`, an earlier run was interrupted, and its files may be replaced too; any other of `files` is somebody's.
 ///
 /// # Errors
-/// [`ReportProblem::OtherResults`] naming the file, or [`Error::Io`].
+/// [`ReportProblem::OtherResults`] naming the file, or [`Kind::Io`](palpate::error::Kind::Io).
 pub fn refuse_others(directory: &Path, made_from: &Value, files: &[&str], trace: Option<&str>) -> Result<()> {
     let summary = directory.join(SUMMARY);
-    let refused = |path: &Path, found: String| Err(Error::at(Place::file(path), ReportProblem::OtherResults { found }));
+    let refused =
+        |path: &Path, found: String| Err(Error::variant_at(Place::file(path), ReportProblem::OtherResults { found }));
     match std::fs::read(&summary) {
         Ok(bytes) => {
             let stated =

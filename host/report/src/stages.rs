@@ -90,7 +90,7 @@ impl Stages<'_> {
 /// # Errors
 /// Errors of `objects`, of measuring and of writing; [`ReportProblem::OneObject`] for fewer than two objects;
 /// [`ReportProblem::OtherResults`] for a directory that holds other results, unless `replace`;
-/// [`Error::Cancelled`](palpate::Error::Cancelled).
+/// [`Kind::Cancelled`](palpate::error::Kind::Cancelled).
 pub fn report(
     objects: &dyn Fn() -> Result<Vec<Object>>,
     settings: &Settings,
@@ -364,7 +364,7 @@ mod tests {
         let directory = place.path().join("report");
         let cancel = CancelAt("noise", AtomicBool::new(false), Mutex::default());
         let error = report(&settings, &directory, false, &cancel).unwrap_err();
-        assert!(matches!(error, palpate::Error::Cancelled), "{error}");
+        assert!(error.is(&palpate::error::Kind::Cancelled), "{error}");
         assert!(!directory.exists());
         // What is long is named with its stage.
         let named = cancel.2.into_inner().unwrap();

@@ -178,7 +178,7 @@ const ROUNDS: u128 = 16;
 /// of those wanted as the one with the smallest share of them.
 ///
 /// # Errors
-/// [`Error::Cancelled`](crate::Error::Cancelled).
+/// [`Kind::Cancelled`](crate::error::Kind::Cancelled).
 pub fn follow(
     model: &Model<'_>,
     supplies: &mut [TouchSupply<'_>],

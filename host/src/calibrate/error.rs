@@ -2,7 +2,7 @@
 
 use super::terms::Terms;
 use super::walk::{Tally, allowed, binomial_tail};
-use crate::error::Problem;
+use crate::error::Variant;
 use palpate_base::wording::two_digits;
 
 /// The probability with which a forecast number of approaches is enough, if the simulation is right.
@@ -262,7 +262,7 @@ pub struct Enough {
     pub most: (u64, String),
 }
 
-impl Problem for CalibrateProblem {
+impl Variant for CalibrateProblem {
     fn fix(&self) -> String {
         match self {
             Self::TooFewSequences { groups: true, .. } => {

@@ -72,8 +72,8 @@ impl Default for Settings {
 /// # Errors
 /// [`CalibrateProblem`], if no threshold keeps the promise, too few names are given to know, or the data set lacks an
 /// object; as [`Margins::new`](crate::evaluate::Margins::new) for touches that the model cannot use;
-/// [`Setting`](crate::error::Setting) for settings out of their ranges;
-/// [`Error::Cancelled`](crate::Error::Cancelled).
+/// [`Kind::Setting`](crate::error::Kind::Setting) for settings out of their ranges;
+/// [`Kind::Cancelled`](crate::error::Kind::Cancelled).
 pub fn calibrate(
     model: &Model<'_>,
     dataset: Dataset,

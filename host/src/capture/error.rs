@@ -1,22 +1,12 @@
 //! Problems with captures.
 
-use crate::error::Problem;
+use crate::error::Variant;
 use std::io::ErrorKind;
 
 /// Problems with captures.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CaptureProblem {
-    /// An object's mesh makes no scene.
-    #[error("{name}: {detail}")]
-    Object {
-        /// The object.
-        name: String,
-        /// Description of the fault.
-        detail: String,
-        /// Remedy, as a sentence.
-        fix: String,
-    },
     /// The true size of an object is needed and not known.
     #[error("{name}: the true size is unknown, because the mesh states no unit")]
     NoTrueSize {
@@ -78,10 +68,9 @@ pub enum CaptureProblem {
     WorkerStopped,
 }
 
-impl Problem for CaptureProblem {
+impl Variant for CaptureProblem {
     fn fix(&self) -> String {
         match self {
-            Self::Object { fix, .. } => return fix.clone(),
             Self::Untouchable { is_true_size: false, .. } => {
                 "Give a larger radius, a smaller spacing or a greater length, keep every approach, also those that miss, or \
                  leave the object out."

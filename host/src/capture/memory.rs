@@ -18,7 +18,7 @@ const CHUNK: u64 = 256;
 /// approaches each object took, in the data set's order. Settings about directories are ignored.
 ///
 /// # Errors
-/// When a setting is wrong or a mesh cannot be touched; [`Error::Cancelled`](crate::Error::Cancelled).
+/// When a setting is wrong or a mesh cannot be touched; [`Kind::Cancelled`](crate::error::Kind::Cancelled).
 pub fn in_memory(objects: &[Object], settings: &Settings, progress: &dyn Progress) -> Result<(Dataset, Vec<u64>)> {
     settings.check()?;
     let mut objects: Vec<&Object> = objects.iter().collect();

@@ -33,7 +33,7 @@ mod table_tests;
 #[cfg(test)]
 mod tests;
 
-use crate::error::{CaptureProblem, Error, Place, Result};
+use crate::error::{CaptureProblem, Error, Kind, Place, Result};
 use crate::in_order::in_order;
 use crate::mesh::{Instance, Object, placements};
 use crate::output::Folder;
@@ -74,7 +74,7 @@ impl Settings {
     /// Refuses settings that make no capture.
     ///
     /// # Errors
-    /// [`Setting`](crate::error::Setting) naming the field.
+    /// [`Kind::Setting`](crate::error::Kind::Setting) naming the field.
     pub fn check(&self) -> Result<()> {
         if self.threads == Some(0) {
             return Err(Error::setting("threads", 0, "1 or more, or none for all that the machine has"));
@@ -133,7 +133,7 @@ impl Summary {
 ///
 /// # Errors
 /// When a setting is wrong, a mesh cannot be touched, the directory cannot be written, or it holds anything else and
-/// [`Settings::force`] is not set, or recorded touches; [`Error::Cancelled`] if `progress` cancels it.
+/// [`Settings::force`] is not set, or recorded touches; [`Kind::Cancelled`](crate::error::Kind::Cancelled) if `progress` cancels it.
 pub fn capture(objects: &[Object], settings: &Settings, directory: &Path, progress: &dyn Progress) -> Result<Summary> {
     settings.check()?;
     let start = Instant::now();
@@ -172,10 +172,10 @@ fn replaced(directory: &Path, wanted: &Listing, force: bool) -> Result<Vec<Strin
     let name = |entry: std::io::Result<DirEntry>| Ok(entry.map_err(io)?.file_name().to_string_lossy().into_owned());
     let mut there: Vec<String> = there.map(name).collect::<Result<_>>()?;
     there.sort();
-    let refuse = |problem| Err(Error::at(Place::file(directory), problem));
+    let refuse = |problem| Err(Error::variant_at(Place::file(directory), problem));
     let found = match Listing::read(directory) {
         // What cannot be read says nothing of other files.
-        Err(Error::At { .. }) if force => None,
+        Err(error) if force && !error.is(&Kind::Io) => None,
         found => found?,
     };
     let mut own = vec![Listing::FILE.to_owned()];
@@ -260,13 +260,7 @@ fn named(object: &Object) -> Vec<String> {
 /// # Errors
 /// A mesh that makes no scene, by its object's name.
 pub fn scenes(objects: &[&Object], origin: &Origin, progress: &dyn Progress) -> Result<Vec<Vec<Scene>>> {
-    let in_object = |object: &Object, error: Error| match error {
-        Error::At { problem, .. } => {
-            let (detail, fix) = (problem.to_string(), problem.fix());
-            CaptureProblem::Object { name: object.name.clone(), detail, fix }.into()
-        }
-        other => other.in_file(&object.name),
-    };
+    let in_object = |object: &Object, error: Error| error.within(format_args!("{}: ", object.name));
     let length = |(object, instance): (&Object, &Instance)| -> Result<f64> {
         let unknown = || CaptureProblem::NoTrueSize { name: object.name.clone() };
         let length = origin.length_of(object, instance).ok_or_else(unknown)?;

@@ -125,7 +125,7 @@ fn chunks(objects: usize, samples: &Range<u64>) -> impl Iterator<Item = (usize, 
 
 fn not_written(path: &Path, error: &std::io::Error) -> Error {
     let problem = CaptureProblem::NotWritten { kind: error.kind(), message: error.to_string() };
-    Error::at(Place::file(path), problem)
+    Error::variant_at(Place::file(path), problem)
 }
 
 /// Computes chunks until they are all done, one fails, the capture is cancelled or the writer is started.

@@ -240,7 +240,7 @@ impl Connection {
 
     /// The error for a problem with this chip.
     pub(super) fn wrong(&self, problem: ChipProblem) -> Error {
-        Error::at(Place::file(self.transport.name()), problem)
+        Error::variant_at(Place::file(self.transport.name()), problem)
     }
 
     /// The model in use on the chip.
@@ -352,7 +352,7 @@ impl Connection {
     ///
     /// # Errors
     /// [`ChipProblem::ModelRefused`] when the chip refuses it: it then goes on with the one it had, as it does when this
-    /// is [cancelled](Error::Cancelled); loaded again, a model goes on where it was. When the line broke or the chip is silent.
+    /// is [cancelled](crate::error::Kind::Cancelled); loaded again, a model goes on where it was. When the line broke or the chip is silent.
     pub fn load(&mut self, bytes: &[u8], progress: &dyn Progress) -> Result<()> {
         progress.begin("loading", Some(bytes.len() as u64));
         self.model = None;

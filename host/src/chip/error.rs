@@ -1,6 +1,6 @@
 //! Problems with chips, real and emulated, and the line to them.
 
-use crate::error::Problem;
+use crate::error::Variant;
 use palpate_shared::link::{LinkError, Refusal};
 use std::path::PathBuf;
 
@@ -127,7 +127,7 @@ fn after_colon(said: &str) -> String {
     if said.trim().is_empty() { String::new() } else { format!(": {}", said.trim()) }
 }
 
-impl Problem for ChipProblem {
+impl Variant for ChipProblem {
     fn fix(&self) -> String {
         match self {
             Self::NotAPort { .. } => "Give a serial port, tcp://HOST:PORT or emulator.",

@@ -53,7 +53,10 @@ impl Port {
             Self::Serial(name) => serial::open(name, baud),
             Self::Tcp(address) => {
                 let io = |source: std::io::Error| {
-                    Error::at(Place::file(self.to_string()), ChipProblem::CannotConnect { reason: source.to_string() })
+                    Error::variant_at(
+                        Place::file(self.to_string()),
+                        ChipProblem::CannotConnect { reason: source.to_string() },
+                    )
                 };
                 let stream = TcpStream::connect(address).map_err(io)?;
                 stream.set_nodelay(true).map_err(io)?;
@@ -96,7 +99,7 @@ mod serial {
         let wrong = |error: serialport::Error| {
             let ports = serialport::available_ports().unwrap_or_default();
             let ports = ports.into_iter().map(|port| port.port_name).collect();
-            Error::at(Place::file(name), ChipProblem::CannotOpen { reason: error.to_string(), ports })
+            Error::variant_at(Place::file(name), ChipProblem::CannotOpen { reason: error.to_string(), ports })
         };
         let port = serialport::new(name, baud).timeout(Duration::from_millis(100)).open().map_err(wrong)?;
         let reader = port.try_clone().map_err(wrong)?;
@@ -138,7 +141,7 @@ mod serial {
     use crate::error::{ChipProblem, Error, Place, Result};
 
     pub(super) fn open(name: &str, _: u32) -> Result<Transport> {
-        Err(Error::at(Place::file(name), ChipProblem::NoSerialPorts))
+        Err(Error::variant_at(Place::file(name), ChipProblem::NoSerialPorts))
     }
 }
 

@@ -127,7 +127,7 @@ fn spawn(command: &mut Command) -> Result<Child> {
     command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().map_err(|source| {
         let program = PathBuf::from(command.get_program());
         match source.kind() {
-            ErrorKind::NotFound => Error::at(Place::file(program), ChipProblem::NoEmulator),
+            ErrorKind::NotFound => Error::variant_at(Place::file(program), ChipProblem::NoEmulator),
             _ => Error::io(program, "start the emulator", source),
         }
     })

@@ -63,7 +63,7 @@ impl Transport {
     pub fn reset_chip(&mut self) -> Result<()> {
         match &self.emulator {
             Some(emulator) => emulator.reset(),
-            None => Err(Error::at(Place::file(&self.name), ChipProblem::NoReset)),
+            None => Err(Error::variant_at(Place::file(&self.name), ChipProblem::NoReset)),
         }
     }
 
@@ -98,7 +98,7 @@ impl Transport {
             }
             None => ChipProblem::Lost { reason: source.to_string() },
         };
-        Error::at(Place::file(&self.name), problem)
+        Error::variant_at(Place::file(&self.name), problem)
     }
 }
 

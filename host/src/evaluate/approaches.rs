@@ -41,7 +41,7 @@ impl Margins<'_> {
     /// itself, over as many sequences.
     ///
     /// # Errors
-    /// [`Setting`](crate::error::Setting): `at` if an object has fewer approaches or a number is 0, and
+    /// [`Kind::Setting`](crate::error::Kind::Setting): `at` if an object has fewer approaches or a number is 0, and
     /// as [`Margins::sequential`].
     pub fn approaches(&self, at: &[usize], settings: &SequentialSettings) -> Result<Approaches> {
         let stopping = self.stopping(settings)?;

@@ -27,7 +27,7 @@ impl Margins<'_> {
     /// Accuracy after 1 to `most` touches, over `groups` groups drawn for each object. With a `most` of 0 it is empty.
     ///
     /// # Errors
-    /// [`Setting`](crate::error::Setting): `groups` if there are none, `at` if an object has fewer
+    /// [`Kind::Setting`](crate::error::Kind::Setting): `groups` if there are none, `at` if an object has fewer
     /// touches.
     pub fn curve(&self, most: usize, groups: usize, seed: u64) -> Result<Curve> {
         if most > 0 || groups == 0 {

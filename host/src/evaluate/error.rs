@@ -1,7 +1,7 @@
 //! Problems with evaluating.
 
 use crate::ensemble::object_of;
-use crate::error::Problem;
+use crate::error::Variant;
 use palpate_shared::Descriptor;
 
 /// Problems with evaluating.
@@ -145,7 +145,7 @@ fn too_few_for_alarms(object: &str, object_sequences: usize, needed: u64) -> Str
     }
 }
 
-impl Problem for EvaluateProblem {
+impl Variant for EvaluateProblem {
     fn fix(&self) -> String {
         match self {
             Self::UnknownObject { object, known } if known.iter().any(|known| is_placement_of(known, object)) => {

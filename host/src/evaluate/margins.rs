@@ -272,7 +272,7 @@ impl<'m> Margins<'m> {
     /// they cannot be recognized, and are not tested.
     ///
     /// # Errors
-    /// [`Setting`](crate::error::Setting) `prior` unless there is a weight for each object, and one of
+    /// [`Kind::Setting`](crate::error::Kind::Setting) `prior` unless there is a weight for each object, and one of
     /// a tested object is above 0.
     pub(crate) fn expecting(mut self, weights: Vec<u32>) -> Result<Self> {
         let objects = self.objects.len();

@@ -55,7 +55,7 @@ pub struct Evaluated {
 ///
 /// # Errors
 /// Errors of [`evaluate`] and [`Margins::new`]; [`EvaluateProblem`](crate::error::EvaluateProblem) for a plan or strangers
-/// that cannot be evaluated; [`Setting`](crate::error::Setting) `at` for more touches than there are enough
+/// that cannot be evaluated; [`Kind::Setting`](crate::error::Kind::Setting) `at` for more touches than there are enough
 /// different groups of.
 pub fn measure(
     candidate: Candidate<'_>,

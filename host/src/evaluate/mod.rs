@@ -166,7 +166,7 @@ pub struct Evaluation {
 /// Evaluates a model on test touches.
 ///
 /// # Errors
-/// [`Setting`](crate::error::Setting): `at` if a number of touches is 0 or more than an object has,
+/// [`Kind::Setting`](crate::error::Kind::Setting): `at` if a number of touches is 0 or more than an object has,
 /// `groups` if there are none, `error_rate` and `max_touches` if they are out of their ranges.
 pub fn evaluate(margins: &Margins<'_>, settings: &Settings) -> Result<Evaluation> {
     let most = settings.at.iter().copied().max().unwrap_or(0);

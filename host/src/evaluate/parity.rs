@@ -42,7 +42,7 @@ const CAPACITY: usize = 256;
 ///
 /// # Errors
 /// [`EvaluateProblem`] when the two are not of the same objects and descriptor, their margins differ by more than the model
-/// states (it was exported from another ensemble), or an object of the data set has no touches; [`Error::Cancelled`](crate::Error::Cancelled).
+/// states (it was exported from another ensemble), or an object of the data set has no touches; [`Kind::Cancelled`](crate::error::Kind::Cancelled).
 pub fn parity(
     ensemble: &Ensemble,
     model: &Model<'_>,
@@ -146,7 +146,7 @@ impl FullMargins {
 /// # Errors
 /// [`EvaluateProblem::OtherModel`] when the two are not of the same objects and descriptor;
 /// [`EvaluateProblem::RawFeatures`] for an ensemble over rows;
-/// [`Error::Cancelled`](crate::Error::Cancelled).
+/// [`Kind::Cancelled`](crate::error::Kind::Cancelled).
 pub fn difference(
     ensemble: &Ensemble,
     model: &Model<'_>,

@@ -102,7 +102,7 @@ impl Margins<'_> {
     /// Pushes random sequences of each object's touches into a recognizer until it stops.
     ///
     /// # Errors
-    /// [`Setting`](crate::error::Setting) if there are no sequences, or the error rate or the limit of
+    /// [`Kind::Setting`](crate::error::Kind::Setting) if there are no sequences, or the error rate or the limit of
     /// touches is out of its range.
     pub fn sequential(&self, settings: &SequentialSettings) -> Result<Sequential> {
         let SequentialSettings { sequences, seed, .. } = *settings;

@@ -1,6 +1,6 @@
 //! Problems with fitting a probe to recordings.
 
-use crate::error::Problem;
+use crate::error::Variant;
 
 /// Problems with fitting a probe to recordings.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -32,7 +32,7 @@ pub enum FitProblem {
     },
 }
 
-impl Problem for FitProblem {
+impl Variant for FitProblem {
     fn fix(&self) -> String {
         match self {
             Self::NotRecorded { .. } => {

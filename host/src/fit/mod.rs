@@ -133,7 +133,7 @@ impl Evidence<'_> {
 /// # Errors
 /// [`FitProblem::NotRecorded`] if a recorded object is not among the objects; [`FitProblem::FewRecorded`] for fewer than
 /// [`LEAST`] touches with two or three contacts; [`FitProblem::OtherStroke`] if the recordings show another stroke than the
-/// probe states; as [`crate::capture::touches`]; [`Error::Cancelled`].
+/// probe states; as [`crate::capture::touches`]; [`Kind::Cancelled`](crate::error::Kind::Cancelled).
 pub fn fit(
     recorded: &Dataset,
     objects: &[Object],

@@ -3,7 +3,7 @@
 use super::pose::Until;
 use super::stated::FARTHEST;
 use crate::calibrate::error::percent;
-use crate::error::Problem;
+use crate::error::Variant;
 use palpate_onboard::ModelError;
 
 /// Problems with recognition of objects with a place.
@@ -178,7 +178,7 @@ fn named(placement: &str) -> String {
     if placement.is_empty() { String::new() } else { format!(" in the placement {placement:?}") }
 }
 
-impl Problem for LocateProblem {
+impl Variant for LocateProblem {
     fn fix(&self) -> String {
         match self {
             Self::NoPosition { .. } => {

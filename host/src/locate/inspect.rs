@@ -35,7 +35,7 @@ impl MapsFile {
         (&file).read_to_end(&mut bytes).map_err(failed)?;
         match Maps::new(&bytes) {
             Ok(_) => Ok(Some(Self(bytes))),
-            Err(error) => Err(Error::at(Place::file(path), LocateProblem::Refused { error })),
+            Err(error) => Err(Error::variant_at(Place::file(path), LocateProblem::Refused { error })),
         }
     }
 

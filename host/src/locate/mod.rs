@@ -133,7 +133,7 @@ impl Settings {
     /// Rejects settings out of range.
     ///
     /// # Errors
-    /// [`Setting`](crate::error::Setting) naming the field.
+    /// [`Kind::Setting`](crate::error::Kind::Setting) naming the field.
     pub fn check(&self) -> Result<()> {
         let within = [
             ("range", self.range, 1.0, 112.0, "a number of millimeters from 1 to 112"),

@@ -77,7 +77,7 @@ pub(super) fn reachable(stated: impl IntoIterator<Item = (&'static str, f64)>) -
 /// Direction of the row of fingers at an angle from the x axis, in degrees.
 ///
 /// # Errors
-/// [`Setting`](crate::error::Setting) beyond a full turn to either side.
+/// [`Kind::Setting`](crate::error::Kind::Setting) beyond a full turn to either side.
 pub fn row(degrees: f64) -> Result<[f64; 3]> {
     if !(-360.0..=360.0).contains(&degrees) {
         return Err(Error::setting("alignment", degrees, "degrees from -360 to 360, or a unit vector"));

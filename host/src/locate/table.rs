@@ -146,9 +146,9 @@ fn steepest(slopes: [f64; 2], covariance: &Square) -> Measured {
 fn contacts(presses: &[(Place, Touch)], probe: &Probe) -> Result<Vec<Contact>> {
     let (mut all, any) = (Vec::new(), Hand { spacing: 0, speed: 0, stroke: None });
     for (press, (place, touch)) in presses.iter().enumerate() {
-        let met = heights(touch, probe).ok_or_else(|| Error::at(place.clone(), LocateProblem::Nowhere))?;
+        let met = heights(touch, probe).ok_or_else(|| Error::variant_at(place.clone(), LocateProblem::Nowhere))?;
         if any.seen(touch).is_none() {
-            return Err(Error::at(place.clone(), LocateProblem::NotDown));
+            return Err(Error::variant_at(place.clone(), LocateProblem::NotDown));
         }
         all.extend(met.into_iter().enumerate().filter_map(|(finger, met)| Some((press, finger, met?))));
     }
@@ -168,7 +168,7 @@ fn check(presses: &[(Place, Touch)], all: &[Contact], kept: &[&Contact], found: 
     if aside as f64 > MOST_ASIDE * all.len() as f64 {
         let farthest = all.iter().max_by(|a, b| a.off(found).abs().total_cmp(&b.off(found).abs()));
         let (place, off) = farthest.map_or_else(Default::default, |own| (presses[own.press].0.clone(), own.off(found)));
-        return Err(Error::at(place, LocateProblem::NotBare { off, aside, contacts: all.len() }));
+        return Err(Error::variant_at(place, LocateProblem::NotBare { off, aside, contacts: all.len() }));
     }
     for finger in 0..FINGERS {
         let presses = kept.iter().filter(|contact| contact.finger == finger).count();

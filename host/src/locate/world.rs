@@ -75,7 +75,7 @@ impl Real {
     /// Checks that these are deviations, a share and a size.
     ///
     /// # Errors
-    /// [`Setting`](crate::error::Setting) naming the first that is not.
+    /// [`Kind::Setting`](crate::error::Kind::Setting) naming the first that is not.
     pub fn check(&self) -> Result<()> {
         let &Self { height, lost, position, drift, drift_yaw, size, bent, tips, table, turned } = self;
         let deviations = [

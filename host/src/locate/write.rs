@@ -23,7 +23,7 @@ const WINDOWS: [i32; 4] = [4, 8, 16, 32];
 /// Writes a model of maps.
 ///
 /// # Errors
-/// [`LocateProblem`] for an object without a surface, or a name or a map that is too large; [`Setting`](crate::error::Setting) for settings out of range.
+/// [`LocateProblem`] for an object without a surface, or a name or a map that is too large; [`Kind::Setting`](crate::error::Kind::Setting) for settings out of range.
 pub fn write(surfaces: &[Surface], objects: &[String], probe: &Probe, settings: &Settings) -> Result<Vec<u8>> {
     settings.check()?;
     if objects.is_empty() {

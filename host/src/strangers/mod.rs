@@ -145,7 +145,7 @@ impl Pools {
 /// this test and does not hold with it: the model states it no more. [`calibrate_with_promise`] finds both.
 ///
 /// # Errors
-/// [`EvaluateProblem`] as for an evaluation, and for too few touches; [`Setting`](crate::error::Setting)
+/// [`EvaluateProblem`] as for an evaluation, and for too few touches; [`Kind::Setting`](crate::error::Kind::Setting)
 /// for shares that are none.
 pub fn calibrate(
     model: &Model<'_>,

@@ -135,7 +135,7 @@ pub struct Grown {
 ///
 /// # Errors
 /// [`RowsProblem`](crate::error::RowsProblem) for a model without classes of rows, and for rows of another number of features;
-/// [`Setting`](crate::error::Setting) for settings out of their ranges.
+/// [`Kind::Setting`](crate::error::Kind::Setting) for settings out of their ranges.
 pub fn evaluate(model: &Model<'_>, sequences: &Sequences, wanted: &Wanted) -> Result<Evaluated> {
     let rows = taken(model, sequences)?;
     let evaluated = measured(model, &Rows::new(model, &rows), &rows.sequences, wanted, true)?;

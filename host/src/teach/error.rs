@@ -1,6 +1,6 @@
 //! Problems with teaching objects from recorded touches.
 
-use crate::error::Problem;
+use crate::error::Variant;
 use palpate_shared::Descriptor;
 use palpate_shared::format::Counted;
 
@@ -67,7 +67,7 @@ pub enum TeachProblem {
     },
 }
 
-impl Problem for TeachProblem {
+impl Variant for TeachProblem {
     fn fix(&self) -> String {
         match self {
             Self::NotOfTouches => "Give an ensemble that was trained on touches.",

@@ -159,7 +159,9 @@ impl Dataset {
     pub fn read(directory: &Path) -> Result<Self> {
         let dataset = Self::read_any(directory)?;
         match dataset.objects.as_slice() {
-            [one] => Err(Error::at(Place::file(directory), TouchesProblem::OneObject { name: one.name.clone() })),
+            [one] => {
+                Err(Error::variant_at(Place::file(directory), TouchesProblem::OneObject { name: one.name.clone() }))
+            }
             _ => Ok(dataset),
         }
     }
@@ -181,7 +183,7 @@ impl Dataset {
             },
         };
         match dataset.objects.is_empty() {
-            true => Err(Error::at(Place::file(directory), TouchesProblem::NoObjects)),
+            true => Err(Error::variant_at(Place::file(directory), TouchesProblem::NoObjects)),
             false => Ok(dataset),
         }
     }
@@ -193,7 +195,7 @@ impl Dataset {
     /// cannot be read, holds no touch, or has a wrong line.
     pub fn read_file(path: &Path) -> Result<ObjectTouches> {
         let extension = path.extension().unwrap_or_default();
-        let wrong = |problem| Err(Error::at(Place::file(path), problem));
+        let wrong = |problem| Err(Error::variant_at(Place::file(path), problem));
         match path.file_stem().and_then(|stem| stem.to_str()) {
             Some(name) if extension == EXTENSION => Ok(ObjectTouches::new(name, text::read(path)?, Source::Object)),
             _ if extension == PARQUET => wrong(TouchesProblem::Parquet),
@@ -214,7 +216,10 @@ impl Dataset {
             };
             if touches.first().is_some_and(|touch| touch.position().is_some() != listing.origin.position) {
                 let (has_position, others) = (!listing.origin.position, Listing::STATED);
-                return Err(Error::at(Place::file(&path), TouchesProblem::OtherPosition { has_position, others }));
+                return Err(Error::variant_at(
+                    Place::file(&path),
+                    TouchesProblem::OtherPosition { has_position, others },
+                ));
             }
             // Of an object whose recording was interrupted before its first touch.
             if may_grow && touches.is_empty() {
@@ -230,7 +235,7 @@ impl Dataset {
     /// Every file of touches.
     fn found(directory: &Path) -> Result<Self> {
         if let Some(table) = of_extension(directory, PARQUET)?.first() {
-            return Err(Error::at(Place::file(table), TouchesProblem::Parquet));
+            return Err(Error::variant_at(Place::file(table), TouchesProblem::Parquet));
         }
         let mut logs = logs(directory)?;
         let mut objects = BTreeMap::new();
@@ -248,7 +253,7 @@ impl Dataset {
         for (name, found) in logged {
             if let Some(Found { file, .. }) = objects.get(&name) {
                 let (file, other) = (file.clone(), found.file);
-                return Err(Error::at(Place::file(directory), TouchesProblem::TwoFiles { name, file, other }));
+                return Err(Error::variant_at(Place::file(directory), TouchesProblem::TwoFiles { name, file, other }));
             }
             objects.insert(name, found);
         }
@@ -309,7 +314,7 @@ impl Dataset {
 
 /// Reads an object's file, and compares it with the listing.
 fn read_listed(entry: &Entry, path: &Path, longest: &Longest, warnings: &mut Vec<Warning>) -> Result<Vec<Touch>> {
-    let wrong = |problem| Error::at(Place::file(path), problem);
+    let wrong = |problem| Error::variant_at(Place::file(path), problem);
     if !path.exists() {
         return Err(wrong(TouchesProblem::Missing { name: entry.name.clone() }));
     }
@@ -350,7 +355,11 @@ fn alike(found: &BTreeMap<String, Found>) -> Result<()> {
     let mut alike = Alike::default();
     for Found { touches, file } in found.values() {
         let admit = |touch: &Touch| alike.admit(*touch).map(drop);
-        touches.touches().iter().try_for_each(admit).map_err(|problem| Error::at(Place::file(file), problem))?;
+        touches
+            .touches()
+            .iter()
+            .try_for_each(admit)
+            .map_err(|problem| Error::variant_at(Place::file(file), problem))?;
     }
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! Problems with data sets and files of touches.
 
-use crate::error::Problem;
+use crate::error::Variant;
 use std::borrow::Cow;
 use std::path::PathBuf;
 
@@ -340,7 +340,7 @@ pub enum TouchesProblem {
     },
 }
 
-impl Problem for TouchesProblem {
+impl Variant for TouchesProblem {
     fn fix(&self) -> String {
         match self {
             Self::Fields { .. }

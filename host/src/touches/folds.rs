@@ -11,7 +11,7 @@ use std::ops::Range;
 /// seed give the same split.
 ///
 /// # Errors
-/// [`Setting`](crate::error::Setting) unless `test_share` is between 0 and 1; [`TouchesProblem::TooFew`] if an
+/// [`Kind::Setting`](crate::error::Kind::Setting) unless `test_share` is between 0 and 1; [`TouchesProblem::TooFew`] if an
 /// object has fewer than two touches.
 pub fn split(dataset: &Dataset, test_share: f64, seed: u64) -> Result<Split> {
     if !(test_share > 0.0 && test_share < 1.0) {
@@ -29,7 +29,7 @@ pub fn split(dataset: &Dataset, test_share: f64, seed: u64) -> Result<Split> {
 /// an object, give or take one; so it is with each of its instances or recordings, give or take two.
 ///
 /// # Errors
-/// [`Setting`](crate::error::Setting) unless there are at least two folds, and `fold` is one of them;
+/// [`Kind::Setting`](crate::error::Kind::Setting) unless there are at least two folds, and `fold` is one of them;
 /// [`TouchesProblem::TooFew`] if an object has fewer touches than there are folds.
 pub fn fold(dataset: &Dataset, fold: usize, folds: usize, seed: u64) -> Result<Split> {
     if folds < 2 {
@@ -89,7 +89,7 @@ fn shuffled(object: &ObjectTouches, seed: u64) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::error::Setting;
+    use crate::error::Kind;
     use crate::touches::{Origin, Source};
     use palpate_shared::Touch;
 
@@ -186,14 +186,13 @@ mod tests {
     fn what_cannot_be_split_says_so() {
         for share in [0.0, 1.0, -0.5, f64::NAN] {
             let error = split(&dataset(&[9, 9]), share, 1).unwrap_err();
-            assert!(matches!(error.problem::<Setting>(), Some(Setting { name: "test_share", .. })), "{error}");
+            assert!(matches!(error.kind(), Kind::Setting { name: "test_share", .. }), "{error}");
             assert_eq!(error.exit_code(), 2);
         }
         let error = split(&dataset(&[9, 1]), 0.1, 1).unwrap_err();
         assert!(error.to_string().contains("object1 has only 1 touches"), "{error}");
-        let problem = |result: Result<Split>| result.unwrap_err().problem::<Setting>().cloned();
-        let setting = |result| match problem(result) {
-            Some(Setting { name, .. }) => name,
+        let setting = |result: Result<Split>| match result.unwrap_err().kind() {
+            Kind::Setting { name, .. } => *name,
             other => panic!("{other:?}"),
         };
         assert_eq!(setting(fold(&dataset(&[9, 9]), 10, 10, 1)), "fold");

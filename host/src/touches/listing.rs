@@ -133,7 +133,7 @@ impl Listing {
     /// When the file cannot be read or is not a listing, and when it names an object twice or by a name that no file can have.
     pub fn read(directory: &Path) -> Result<Option<Self>> {
         if directory.is_file() && is_bag(directory) {
-            return Err(Error::at(Place::file(directory), TouchesProblem::Bag));
+            return Err(Error::variant_at(Place::file(directory), TouchesProblem::Bag));
         }
         let path = Self::path(directory);
         match std::fs::read(&path) {
@@ -150,15 +150,15 @@ impl Listing {
     pub fn parse(bytes: &[u8], path: &Path) -> Result<Self> {
         let listing: Self = serde_json::from_slice(bytes).map_err(|error| {
             let problem = TouchesProblem::BadListing { message: error.to_string() };
-            Error::at(Place::line(path, error.line() as u64), problem)
+            Error::variant_at(Place::line(path, error.line() as u64), problem)
         })?;
         let mut names: Vec<&str> = listing.objects.iter().map(|entry| entry.name.as_str()).collect();
         names.sort_unstable();
         if let Some(&name) = names.iter().find(|name| !is_file_name(name)) {
-            return Err(Error::at(Place::file(path), TouchesProblem::BadName { name: name.into() }));
+            return Err(Error::variant_at(Place::file(path), TouchesProblem::BadName { name: name.into() }));
         }
         if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
-            return Err(Error::at(Place::file(path), TouchesProblem::ListedTwice { name: pair[0].into() }));
+            return Err(Error::variant_at(Place::file(path), TouchesProblem::ListedTwice { name: pair[0].into() }));
         }
         Ok(listing)
     }

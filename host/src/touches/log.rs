@@ -98,7 +98,7 @@ impl Log {
         let (mut touches, mut objects, mut numbers, mut size) = (Vec::new(), Vec::new(), HashMap::new(), 0);
         let mut alike = text::Alike::default();
         let channels = mcap::read(bytes, path, |Message { time, offset, touch, object }| {
-            let wrong = |problem| Err(Error::at(Place::byte(path, offset), problem));
+            let wrong = |problem| Err(Error::variant_at(Place::byte(path, offset), problem));
             if let Err(problem) = alike.admit(touch) {
                 return wrong(problem);
             }
@@ -126,10 +126,10 @@ impl Log {
             Ok(())
         })?;
         if touches.is_empty() {
-            return Err(Error::at(Place::file(path), TouchesProblem::NoTouches));
+            return Err(Error::variant_at(Place::file(path), TouchesProblem::NoTouches));
         }
         let checked = Longest::default().check_all(touches.iter().map(|logged| (logged.offset, &logged.touch)));
-        checked.map_err(|(offset, problem)| Error::at(Place::byte(path, offset), problem))?;
+        checked.map_err(|(offset, problem)| Error::variant_at(Place::byte(path, offset), problem))?;
         // Messages of one time stay in the order of the file.
         touches.sort_by_key(|logged| logged.time);
         Ok(Self { path: path.into(), touches, objects, channels })
@@ -187,7 +187,7 @@ impl Log {
         let touches: Vec<Touch> = self.touches.iter().filter(is_it).map(|logged| logged.touch).collect();
         if touches.is_empty() {
             let problem = TouchesProblem::NotInLog { object: object.into(), objects: self.objects.join(", ") };
-            return Err(Error::at(Place::file(&self.path), problem));
+            return Err(Error::variant_at(Place::file(&self.path), problem));
         }
         let others = self.touches.len() - touches.len();
         Ok((touches, others))
@@ -196,7 +196,7 @@ impl Log {
     fn all_or_none_named(&self) -> Result<()> {
         match self.touches.iter().find(|logged| logged.object.is_none()) {
             Some(nameless) if !self.objects.is_empty() => {
-                Err(Error::at(Place::byte(&self.path, nameless.offset), TouchesProblem::NamelessTouch))
+                Err(Error::variant_at(Place::byte(&self.path, nameless.offset), TouchesProblem::NamelessTouch))
             }
             _ => Ok(()),
         }

@@ -7,5 +7,5 @@ use std::path::Path;
 
 /// No log.
 pub(super) fn read(_: impl Read, path: &Path, _: impl FnMut(Message) -> Result<()>) -> Result<Channels> {
-    Err(Error::at(Place::file(path), TouchesProblem::NoMcap))
+    Err(Error::variant_at(Place::file(path), TouchesProblem::NoMcap))
 }

@@ -85,7 +85,7 @@ impl Origin {
     /// Rejects settings that no touches can be made with.
     ///
     /// # Errors
-    /// [`Setting`](crate::error::Setting) naming the field.
+    /// [`Kind::Setting`](crate::error::Kind::Setting) naming the field.
     pub fn check(&self) -> Result<()> {
         if self.touches == 0 {
             let name = if self.approaches { "approaches" } else { "touches" };

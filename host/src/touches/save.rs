@@ -28,16 +28,19 @@ impl Dataset {
             names.push(Listing::FILE.into());
         }
         if !names.is_empty() {
-            return Err(Error::at(Place::file(directory), TouchesProblem::HoldsFiles { files: names }));
+            return Err(Error::variant_at(Place::file(directory), TouchesProblem::HoldsFiles { files: names }));
         }
         let origin = &self.origin;
         let of_several = |object: &&ObjectTouches| object.sources().len() > 1;
         if let (None, Some(several)) = (origin, self.objects.iter().find(of_several)) {
             let (name, sources) = (several.name.clone(), several.sources().len());
-            return Err(Error::at(Place::file(directory), TouchesProblem::Unsaid { name, sources }));
+            return Err(Error::variant_at(Place::file(directory), TouchesProblem::Unsaid { name, sources }));
         }
         if let Some(object) = self.objects.iter().find(|object| object.has_robots()) {
-            return Err(Error::at(Place::file(directory), TouchesProblem::OfRobots { name: object.name.clone() }));
+            return Err(Error::variant_at(
+                Place::file(directory),
+                TouchesProblem::OfRobots { name: object.name.clone() },
+            ));
         }
         let poses = origin.as_ref().is_none_or(|origin| origin.pose) || self.is_recorded();
         let mut listing = Listing::new(&origin.clone().unwrap_or_default(), self.names());

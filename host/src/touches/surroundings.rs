@@ -38,7 +38,7 @@ impl Surroundings {
     /// Refuses a cone that has no directions, or some from below.
     ///
     /// # Errors
-    /// [`Setting`](crate::error::Setting) naming `cone`.
+    /// [`Kind::Setting`](crate::error::Kind::Setting) naming `cone`.
     pub fn check(&self) -> Result<()> {
         match self.cone() {
             Some(cone) if !(cone > 0.0 && cone <= 90.0) => {

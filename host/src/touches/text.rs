@@ -67,7 +67,8 @@ impl<R: BufRead> Iterator for Lines<R> {
                 Ok(0) => return None,
                 Ok(_) => {}
             }
-            let touch = self.touch(&bytes).map_err(|problem| Error::at(Place::line(&self.path, self.line), problem));
+            let touch =
+                self.touch(&bytes).map_err(|problem| Error::variant_at(Place::line(&self.path, self.line), problem));
             match touch.transpose() {
                 None => {}
                 Some(touch) => return Some(touch.map(|touch| (self.line, touch))),
@@ -92,7 +93,7 @@ pub(super) fn numbered(text: impl BufRead, path: &Path) -> impl Iterator<Item = 
             Ok((line, touch)) => (line, touch?),
             Err(error) => return Some(Err(error)),
         };
-        let admitted = alike.admit(touch).map_err(|problem| Error::at(Place::line(path, line), problem));
+        let admitted = alike.admit(touch).map_err(|problem| Error::variant_at(Place::line(path, line), problem));
         Some(admitted.map(|touch| (line, touch)))
     })
 }
@@ -111,7 +112,7 @@ pub(super) fn read_with_checksum(path: &Path, longest: &Longest) -> Result<(Vec<
     let mut text = BufReader::with_capacity(1 << 16, Checked::new(file));
     let touches = within(&mut text, path, longest)?;
     if touches.is_empty() {
-        return Err(Error::at(Place::file(path), TouchesProblem::NoTouches));
+        return Err(Error::variant_at(Place::file(path), TouchesProblem::NoTouches));
     }
     Ok((touches, text.into_inner().checksum()))
 }
@@ -123,7 +124,7 @@ pub(super) fn read_with_checksum(path: &Path, longest: &Longest) -> Result<(Vec<
 pub fn within(text: impl BufRead, path: &Path, longest: &Longest) -> Result<Vec<Touch>> {
     let touches = numbered(text, path).collect::<Result<Vec<_>>>()?;
     let checked = longest.check_all(touches.iter().map(|(line, touch)| (*line, touch)));
-    checked.map_err(|(line, problem)| Error::at(Place::line(path, line), problem))?;
+    checked.map_err(|(line, problem)| Error::variant_at(Place::line(path, line), problem))?;
     Ok(touches.into_iter().map(|(_, touch)| touch).collect())
 }
 

@@ -176,7 +176,7 @@ fn what_cannot_be_evaluated_says_so() {
     ] {
         let error = evaluate(&margins, &settings).unwrap_err();
         assert!(error.exit_code() == 2 && error.to_string().contains(expected), "{error}");
-        assert!(matches!(error.problem::<Setting>(), Some(Setting { .. })), "{error:?}");
+        assert!(matches!(error.kind(), Kind::Setting { .. }), "{error:?}");
     }
     let unknown = synthetic::dataset(&[9, 9, 9, 9], 1);
     let error = Margins::new(Candidate::Full(&ENSEMBLE), &unknown).err().unwrap();

@@ -5,7 +5,7 @@ mod files;
 
 use files::{channel, chunk, file, message, python, record, schema, touches};
 use palpate::chip::{Step, Steps};
-use palpate::error::{Error, Place, Problem, TouchesProblem};
+use palpate::error::{Error, Place, TouchesProblem, Variant};
 use palpate::shared::Touch;
 use palpate::touches::check::Check;
 use palpate::touches::mcap::TOUCH;
@@ -27,8 +27,7 @@ fn error(bytes: &[u8]) -> String {
 fn problem(bytes: &[u8]) -> (TouchesProblem, Place) {
     let error = read(bytes).map(|log| log.touches().len()).unwrap_err();
     let problem = error.problem::<TouchesProblem>().unwrap_or_else(|| panic!("{error}")).clone();
-    let Error::At { place, .. } = error else { panic!("{error}") };
-    (problem, place)
+    (problem, error.place().clone())
 }
 
 /// The touches that make.py wrote, with and without their poses.

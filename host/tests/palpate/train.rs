@@ -64,8 +64,7 @@ fn settings_out_of_range_are_refused_by_name() {
     ] {
         let error = train(&dataset, &settings, &()).unwrap_err();
         assert!(
-            matches!(error.problem::<Setting>(), Some(Setting { name, .. }) if *name == expected)
-                && error.exit_code() == 2,
+            matches!(error.kind(), Kind::Setting { name, .. } if *name == expected) && error.exit_code() == 2,
             "{error}"
         );
         assert!(!error.to_string().contains("--"), "the library names an option: {error}");

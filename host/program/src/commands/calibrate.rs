@@ -273,7 +273,7 @@ fn untrained(compiled: &CompiledModel, directory: &PathBuf) -> Result<Dataset> {
         return Ok(dataset);
     }
     let objects = trained_on.into_iter().map(String::from).collect();
-    Err(Error::at(Place::file(directory), CalibrateProblem::TrainedOn { objects }))
+    Err(Error::variant_at(Place::file(directory), CalibrateProblem::TrainedOn { objects }))
 }
 
 fn text(path: &Path, calibrated: &Calibrated, placements: &str) -> String {

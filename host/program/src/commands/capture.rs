@@ -4,7 +4,7 @@ use super::progress::{Bar, cancel_when_interrupted};
 use super::scene::{SceneArguments, described};
 use super::{Global, remark};
 use palpate::capture::{self, Settings, Summary};
-use palpate::error::{CaptureProblem, Problem, TouchesProblem};
+use palpate::error::{CaptureProblem, TouchesProblem, Variant};
 use palpate::mesh::BACKGROUND;
 use palpate::mesh::facts::Facts;
 use palpate::output;

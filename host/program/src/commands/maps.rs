@@ -131,9 +131,11 @@ pub(super) fn train(
         .expecting(&Real::like(&dataset.real(), probe.speed))
         .expecting(&Real::of(noise, probe.speed)?);
     let settings = given.over(settings);
-    settings.check().map_err(|error| match error.problem::<palpate::error::Setting>() {
-        Some(wrong) => Error::setting("maps", format!("{}={}", wrong.name, wrong.value), wrong.allowed.clone()),
-        None => error,
+    settings.check().map_err(|error| match error.kind() {
+        palpate::error::Kind::Setting { name, value, allowed } => {
+            Error::setting("maps", format!("{name}={value}"), allowed.clone())
+        }
+        _ => error,
     })?;
     let surfaces = locate::learn(dataset, &settings)?;
     let names = dataset.names();

@@ -45,7 +45,7 @@ mod view;
 
 use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use palpate::error::{CaptureProblem, EvaluateProblem, MeshProblem, Place, Setting};
+use palpate::error::{CaptureProblem, EvaluateProblem, Kind, MeshProblem, Place};
 use palpate::touches::{Dataset, Listing, Log, Warning};
 use palpate::{Error, Result, output};
 use std::path::{Path, PathBuf};
@@ -321,7 +321,7 @@ pub fn main() -> ExitCode {
     match cli.global.apply().and_then(|()| cli.command.run(&cli.global)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            if !matches!(error, Error::Closed) {
+            if !error.is(&Kind::Closed) {
                 let command = matches.subcommand_name().unwrap_or_default();
                 let text = message(&error, command);
                 // Programs that read results find the error where those would be. If there are some, the exit code tells.
@@ -388,7 +388,7 @@ fn with_instead(mut error: clap::Error, words: &[String]) -> clap::Error {
 
 /// The error as the user of `command` understands it: where the library names a setting, this names the option.
 fn message(error: &Error, command: &str) -> String {
-    let (Error::At { place, problem }, Some(Setting { name, value, .. })) = (error, error.problem()) else {
+    let Kind::Setting { name, value, .. } = error.kind() else {
         return error.to_string();
     };
     let option = option_of(name).replace('_', "-");
@@ -400,7 +400,7 @@ fn message(error: &Error, command: &str) -> String {
         .chain([&cli])
         .flat_map(|command| command.get_arguments());
     if arguments.any(|argument| argument.get_long() == Some(&option)) {
-        return format!("{place}--{option} is {value}. {}", problem.fix());
+        return format!("{}--{option} is {value}. {}", error.place(), error.remedy());
     }
     error.to_string()
 }
@@ -433,7 +433,7 @@ fn is_located(dataset: &Dataset) -> bool {
 
 /// Refuses touches with a position, for a model of trees.
 fn refuse_located(dataset: &Dataset, directory: &Path) -> Result<()> {
-    if is_located(dataset) { Err(Error::at(Place::file(directory), EvaluateProblem::Located)) } else { Ok(()) }
+    if is_located(dataset) { Err(Error::variant_at(Place::file(directory), EvaluateProblem::Located)) } else { Ok(()) }
 }
 
 /// A data set whose warnings went to stderr.

@@ -4,13 +4,13 @@ use super::Global;
 use super::probe::ProbeArguments;
 use super::progress::Bar;
 use super::real::RealArguments;
+use palpate::Result;
 use palpate::compile::CompiledModel;
 use palpate::evaluate::{self, Planned};
 use palpate::output;
 use palpate::probe::noise::Noise;
 use palpate::progress::Progress;
 use palpate::wording::{count, counted, decimal};
-use palpate::{Error, Result};
 use palpate_shared::DIRECTIONS;
 use std::path::{Path, PathBuf};
 
@@ -48,7 +48,7 @@ pub(super) fn run(wanted: &Wanted<'_>, global: &Global) -> Result<()> {
     let progress = Bar::new();
     progress.begin("planning", None);
     let planned = evaluate::plan(&compiled.model(), &dataset, wanted.rolls).map_err(|error| match error {
-        Error::At { .. } if error.exit_code() == 1 => error.in_file(directory),
+        error if error.exit_code() == 1 => error.in_file(directory),
         _ => error,
     })?;
     drop(progress);

@@ -53,7 +53,7 @@ impl RealArguments {
         };
         match self.real.as_ref().map(|real| &real.given) {
             _ if noise.grazing.is_none() => Ok(noise),
-            Some(Given::File(path)) => Err(Error::at(Place::file(path), ProbeProblem::OnlyCaptured)),
+            Some(Given::File(path)) => Err(Error::variant_at(Place::file(path), ProbeProblem::OnlyCaptured)),
             _ => Err(ProbeProblem::OnlyCaptured.into()),
         }
     }

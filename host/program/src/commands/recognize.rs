@@ -112,7 +112,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let stopping = if arguments.error_rate.is_none() { own.with_max_touches(max_touches) } else { stopping };
     let too_many = |error: palpate_onboard::CapacityError| {
         let problem = EvaluateProblem::TooManyObjects { objects: error.objects, capacity: error.capacity };
-        Error::at(Place::file(&arguments.model), problem)
+        Error::variant_at(Place::file(&arguments.model), problem)
     };
     let recognizer = Recognizer::<256>::new(&model, stopping).map_err(too_many)?;
     let weights = arguments.expected.weights(&compiled.names(), &palpate::evaluate::own_weights(&model))?;
@@ -126,7 +126,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
             .map_err(|error| error.in_file(&arguments.model));
     }
     if model.descriptor().is_none() {
-        return Err(Error::at(Place::file(&arguments.model), EvaluateProblem::RawFeatures));
+        return Err(Error::variant_at(Place::file(&arguments.model), EvaluateProblem::RawFeatures));
     }
     if arguments.next {
         let allowed =
@@ -134,7 +134,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         return Err(Error::setting("next", "given", allowed));
     }
     if arguments.active && model.plan().is_none() {
-        return Err(Error::at(Place::file(&arguments.model), EvaluateProblem::NoPlan));
+        return Err(Error::variant_at(Place::file(&arguments.model), EvaluateProblem::NoPlan));
     }
     let longest = compile::longest(&model);
     let (active, json) = (arguments.active, global.json);
@@ -169,9 +169,9 @@ impl<'m> Stream<'m> {
             Event::Begin => self.reset(),
             Event::Touch { touch, place } => {
                 if touch.position().is_some() {
-                    return Err(Error::at(place, EvaluateProblem::Located));
+                    return Err(Error::variant_at(place, EvaluateProblem::Located));
                 }
-                self.longest.check(touch).map_err(|problem| Error::at(place, problem))?;
+                self.longest.check(touch).map_err(|problem| Error::variant_at(place, problem))?;
                 self.push(touch)?;
             }
         }

@@ -180,7 +180,7 @@ impl<'m> Stream<'m> {
                 None
             }
             Err(aslant @ LocateProblem::NotDown) => Some(aslant.to_string()),
-            Err(problem) => return Err(Error::at(place, problem)),
+            Err(problem) => return Err(Error::variant_at(place, problem)),
         };
         self.print(refused)?;
         if self.locating.verdict() != Verdict::Undecided {

@@ -83,7 +83,7 @@ pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, asked: &Asked<'_
     let path = if path.as_os_str() == "-" { Path::new("/dev/stdin") } else { path };
     let features = if adds_up { Features::measured(&model) } else { Features::from(&model) };
     let rows = read_rows(path, features, sequence)?;
-    let starts = starts(&rows.labels).map_err(|problem| Error::at(Place::file(path), problem))?;
+    let starts = starts(&rows.labels).map_err(|problem| Error::variant_at(Place::file(path), problem))?;
     if let Some(promise) = model.promise().filter(|_| adds_up && sequence.is_none()) {
         super::remark(&format!(
             "palpate: note: {}: nothing says where a sequence ends (--sequence-column), so the promise of {} % is for the first \

@@ -165,5 +165,5 @@ fn evaluated_text(evaluated: &Evaluated) -> String {
 
 /// Refuses sequences of an ensemble: only a compiled model stops.
 pub(crate) fn needs_compiled(path: &Path) -> Error {
-    Error::at(Place::file(path), RowsProblem::NotCompiled)
+    Error::variant_at(Place::file(path), RowsProblem::NotCompiled)
 }

@@ -93,7 +93,7 @@ impl TableArguments {
         let Some(file) = MapsFile::read(wanted.model)? else {
             // If the file holds no trees either, its own error says why.
             palpate::compile::CompiledModel::read(wanted.model)?;
-            return Err(Error::at(palpate::error::Place::file(wanted.model), LocateProblem::Trees));
+            return Err(Error::variant_at(palpate::error::Place::file(wanted.model), LocateProblem::Trees));
         };
         let maps = file.maps();
         let probe = locate::hand(&maps).map_err(|error| error.in_file(wanted.model))?;

@@ -81,7 +81,7 @@ fn add(all: &mut Dataset, mut read: Dataset, path: &Path) -> Result<()> {
         }
     }
     if let Some(twice) = read.objects.iter().find(|object| all.objects.iter().any(|other| other.name == object.name)) {
-        return Err(Error::at(Place::file(path), TouchesProblem::RecordedTwice { name: twice.name.clone() }));
+        return Err(Error::variant_at(Place::file(path), TouchesProblem::RecordedTwice { name: twice.name.clone() }));
     }
     if let (Some(one), Some(other)) = (&all.origin, &read.origin) {
         let stated = [one, other].map(|origin| palpate::ensemble::StatedProbe::from(origin).trained());

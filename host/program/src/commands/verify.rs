@@ -67,7 +67,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         }
         // A log is a data set, too.
         if data.is_file() && !palpate::touches::is_log(data) {
-            return Err(Error::at(Place::file(&arguments.ensemble), EvaluateProblem::OverTouches));
+            return Err(Error::variant_at(Place::file(&arguments.ensemble), EvaluateProblem::OverTouches));
         }
         let data = (data.as_path(), arguments.sequences);
         return super::parity::run((&arguments.model, &compiled), &ensemble, data, global);
@@ -85,7 +85,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     };
     let library = Library { margins: margins.as_deref(), values: values.as_deref() };
     let verified = verify(&compiled.model(), &ensemble, &rows, library, &Bar::new()).map_err(place)?;
-    let checked = verified.check().map_err(|problem| Error::at(Place::file(&arguments.model), problem));
+    let checked = verified.check().map_err(|problem| Error::variant_at(Place::file(&arguments.model), problem));
     if arguments.prove && checked.is_ok() {
         let verified = Some((&verified, text(&verified)));
         return super::prove::run(&arguments.model, &arguments.ensemble, verified, &options, global);

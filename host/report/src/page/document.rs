@@ -183,7 +183,7 @@ impl Page {
     /// The page comes last, each file whole or not at all. Returns what was written.
     ///
     /// # Errors
-    /// [`palpate::Error::Io`] naming the file.
+    /// [`Kind::Io`](palpate::error::Kind::Io) naming the file.
     pub fn write(&self, path: &Path) -> Result<Vec<PathBuf>> {
         let mut files = Vec::new();
         if self.files {

@@ -1,6 +1,6 @@
 //! Problems with drawing.
 
-use palpate::error::Problem;
+use palpate::error::Variant;
 
 /// Problems with drawing.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -28,7 +28,7 @@ pub enum PageProblem {
     },
 }
 
-impl Problem for PageProblem {
+impl Variant for PageProblem {
     fn fix(&self) -> String {
         match self {
             Self::Chart { .. } | Self::Csv { .. } | Self::Scene { .. } => "Report this as a bug.".into(),

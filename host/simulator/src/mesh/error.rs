@@ -1,6 +1,6 @@
 //! Problems with meshes and where they come from.
 
-use crate::error::Problem;
+use crate::error::Variant;
 use std::path::PathBuf;
 
 /// Problems with meshes and where they come from.
@@ -196,7 +196,7 @@ fn variation(seed: &Option<u64>) -> String {
     seed.map_or("in its canonical proportions".into(), |seed| format!("with seed {seed}"))
 }
 
-impl Problem for MeshProblem {
+impl Variant for MeshProblem {
     fn fix(&self) -> String {
         match self {
             Self::NoSuchSource { builtin } => {

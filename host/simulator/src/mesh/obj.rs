@@ -22,7 +22,7 @@ pub(super) const KEYWORDS: [&[u8]; 11] =
 /// [`file::read`](super::file::read) says so.
 ///
 /// # Errors
-/// [`Error::Io`] when the file cannot be read; a [`MeshProblem`] with its line when a vertex is not three finite numbers
+/// [`Kind::Io`](crate::error::Kind::Io) when the file cannot be read; a [`MeshProblem`] with its line when a vertex is not three finite numbers
 /// or a face's index is not a whole number or out of range, and with the file when there is no face or each is a single
 /// point.
 pub fn read(path: &Path) -> Result<Mesh> {
@@ -48,7 +48,7 @@ pub(super) fn parse_moved(text: impl BufRead, path: &Path) -> Result<Moved> {
         return Err(error);
     }
     filter.check_indices()?;
-    let unusable = |problem| Error::at(Place::file(path), problem);
+    let unusable = |problem| Error::variant_at(Place::file(path), problem);
     let (models, _) = loaded.map_err(|error| unusable(MeshProblem::Unreadable { reason: error.to_string() }))?;
     let vertices: Vec<[f64; 3]> = models.iter().flat_map(|model| model.mesh.positions.as_chunks().0).copied().collect();
     let offset = Bounds::of(vertices.iter().copied()).offset();
@@ -123,7 +123,7 @@ impl<'a, R: BufRead> FacesOnly<'a, R> {
             return Ok(());
         }
         let problem = MeshProblem::IndexAfterLast { index, vertices: self.vertices };
-        Err(Error::at(Place::line(self.path, line), problem))
+        Err(Error::variant_at(Place::line(self.path, line), problem))
     }
 
     /// Reads the next line, with the lines that a backslash joins to it; false at the end of the text.
@@ -193,7 +193,7 @@ impl<'a, R: BufRead> FacesOnly<'a, R> {
         self.clean.clear();
         self.taken = 0;
         while self.clean.len() < PORTION && self.next_line()? {
-            self.clean_line().map_err(|problem| Error::at(Place::line(self.path, self.line), problem))?;
+            self.clean_line().map_err(|problem| Error::variant_at(Place::line(self.path, self.line), problem))?;
         }
         Ok(())
     }

@@ -54,7 +54,7 @@ impl Probe {
     /// microseconds on an object whose bounding box's longest side is `length` units.
     ///
     /// # Errors
-    /// A [`Setting`](crate::error::Setting) that names the field, or `length`.
+    /// A [`Kind::Setting`](crate::error::Kind::Setting) that names the field, or `length`.
     pub fn check(&self, length: f64) -> Result<()> {
         let positive = [("length", length), ("radius", self.radius), ("speed", self.speed)];
         for (name, value) in positive {

@@ -1,11 +1,11 @@
 //! Problems with scenes and probes.
 
-use crate::error::Problem;
+use crate::error::Variant;
 
 /// Problems with scenes and probes.
 ///
 /// A fault of a scene's mesh is a [`MeshProblem`](crate::mesh::MeshProblem), a probe's measure out of range a
-/// [`Setting`](crate::error::Setting).
+/// [`Kind::Setting`](crate::error::Kind::Setting).
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ProbeProblem {
@@ -58,7 +58,7 @@ pub enum ProbeProblem {
     },
 }
 
-impl Problem for ProbeProblem {
+impl Variant for ProbeProblem {
     fn fix(&self) -> String {
         match self {
             Self::Differs { .. } => "Use both with the same probe: with another, times have another meaning.".into(),

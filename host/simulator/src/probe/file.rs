@@ -28,7 +28,7 @@
 //! Radius, spacing, speed, stroke and unit are what a data set and a model state and what is compared. What the real probe adds
 //! is not compared: it is added to touches by a capture with this file or else in training and testing, and never twice.
 
-use crate::error::{Error, Place, ProbeProblem, Problem, Result};
+use crate::error::{Error, Place, ProbeProblem, Result, Variant};
 use crate::probe::approach::{FINGERS, Probe};
 use crate::probe::noise::{Deviation, Grazing, Noise, quantity};
 use palpate_shared::format::Length;
@@ -105,7 +105,7 @@ impl ProbeFile {
     ///
     /// # Errors
     /// If it cannot be read; with file and line [`ProbeProblem::BadFile`] if it is not TOML, lacks a measure or has what
-    /// a probe does not; with the file [`Setting`](crate::error::Setting) if a number is out of its
+    /// a probe does not; with the file [`Kind::Setting`](crate::error::Kind::Setting) if a number is out of its
     /// range.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
@@ -125,7 +125,7 @@ impl ProbeFile {
                 Some(before) => Place::line(path, 1 + before.matches('\n').count() as u64),
                 None => Place::file(path),
             };
-            Error::at(place, ProbeProblem::BadFile { message })
+            Error::variant_at(place, ProbeProblem::BadFile { message })
         })?;
         let file = Self::of(&document);
         let length = match file.unit {

@@ -1,7 +1,7 @@
 use glam::DVec3;
 use palpate_shared::format::TrainedNoise;
 use palpate_shared::{ContactTime, Pose, Q15_ONE, Touch};
-use palpate_simulator::error::Setting;
+use palpate_simulator::error::Kind;
 use palpate_simulator::mesh::Mesh;
 use palpate_simulator::probe::approach::FINGERS;
 use palpate_simulator::probe::approach::{Approach, Probe};
@@ -201,7 +201,7 @@ fn noise_that_cannot_be_is_refused_by_the_name_of_its_setting() {
         (with!(base; grazing: Grazing { angle: 90.0, bend: 1.0 }), "grazing"),
     ] {
         let error = noise.check().unwrap_err();
-        assert!(matches!(error.problem::<Setting>(), Some(Setting { name: found, .. }) if *found == name), "{error}");
+        assert!(matches!(error.kind(), Kind::Setting { name: found, .. } if *found == name), "{error}");
     }
     assert!(base.check().is_ok() && base.is_none() && !Noise::gaussian(1.0).is_none());
 }

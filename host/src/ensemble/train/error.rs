@@ -1,6 +1,6 @@
 //! Problems with training on touches.
 
-use crate::error::Problem;
+use crate::error::Variant;
 use palpate_shared::Descriptor;
 use palpate_shared::format::Counted;
 
@@ -53,7 +53,7 @@ pub enum TrainProblem {
     },
 }
 
-impl Problem for TrainProblem {
+impl Variant for TrainProblem {
     fn fix(&self) -> String {
         match self {
             Self::OneObject => "Capture at least two.",

@@ -174,9 +174,9 @@ impl Settings {
 /// of threads. Progress is counted in rounds.
 ///
 /// # Errors
-/// [`Setting`](crate::error::Setting) if a setting is out of its range; [`TrainProblem`] if there are
+/// [`Kind::Setting`](crate::error::Kind::Setting) if a setting is out of its range; [`TrainProblem`] if there are
 /// fewer than two objects or more than 256, a name that no file can hold, an object without touches, or the descriptor
-/// needs a pose that no touch has. All of it is found before the training starts. [`Error::Cancelled`].
+/// needs a pose that no touch has. All of it is found before the training starts. [`Kind::Cancelled`](crate::error::Kind::Cancelled).
 pub fn train(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) -> Result<Ensemble> {
     let shares = dataset.placement_shares();
     if shares.is_empty() {
@@ -314,7 +314,7 @@ fn with_palpate(
     };
     let trained = boost::train(rows.lent(), objects.len(), parameters, settings.threads, &on_round);
     let (base_margins, trees) = trained.map_err(|failure| match failure {
-        boost::Failure::Cancelled => Error::Cancelled,
+        boost::Failure::Cancelled => Error::cancelled(),
         refused => TrainProblem::Trainer { trainer: "palpate", detail: refused.to_string() }.into(),
     })?;
     Ok(Ensemble { inputs: inputs(settings.descriptor), objects, base_margins, trees, origin: Provenance::default() })

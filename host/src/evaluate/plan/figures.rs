@@ -22,7 +22,7 @@ struct Counts {
 /// drawn at random. Touches, too, are those of such approaches.
 ///
 /// # Errors
-/// [`Setting`](crate::error::Setting) as [`evaluate`](crate::evaluate::evaluate()).
+/// [`Kind::Setting`](crate::error::Kind::Setting) as [`evaluate`](crate::evaluate::evaluate()).
 pub(crate) fn evaluate_active(margins: &Margins<'_>, active: &Active, settings: &Settings) -> Result<Evaluation> {
     let Settings { at, at_approaches, groups, seed, .. } = settings;
     let rule = margins.stopping(&settings.sequences())?;

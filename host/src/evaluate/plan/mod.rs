@@ -61,7 +61,7 @@ pub struct Hardest {
 /// the model counts as evidence of 0.
 ///
 /// # Errors
-/// [`Setting`](crate::error::Setting) `rolls`; as [`Margins::new`]; [`EvaluateProblem`] if the model has
+/// [`Kind::Setting`](crate::error::Kind::Setting) `rolls`; as [`Margins::new`]; [`EvaluateProblem`] if the model has
 /// fewer than two objects, if the data set has no approaches, none of one of the objects, none with a pose, or too few in
 /// a pose.
 pub fn plan(model: &Model<'_>, dataset: &Dataset, rolls: u8) -> Result<Planned> {

@@ -11,7 +11,7 @@ use super::checksum::Checked;
 use super::dataset::name_of;
 use super::warning::channels_said;
 use super::{Entry, Listing, Log, Longest, Origin, Warning, is_log, logs, text};
-use crate::error::{Error, Place, Result, TouchesProblem};
+use crate::error::{Error, Kind, Place, Result, TouchesProblem};
 use palpate_shared::Touch;
 use std::collections::HashMap;
 use std::fs::File;
@@ -67,7 +67,7 @@ impl Check {
         }
         let listing = match Listing::read(directory) {
             Ok(listing) => listing,
-            Err(error) if directory.is_file() || matches!(error, Error::Io { .. }) => return Err(error),
+            Err(error) if directory.is_file() || error.is(&Kind::Io) => return Err(error),
             Err(error) => {
                 findings.error(error);
                 None
@@ -185,7 +185,7 @@ fn found(directory: &Path, findings: &mut Findings) -> Result<Vec<Read>> {
 fn logged(path: &Path, objects: &mut Vec<Read>, findings: &mut Findings) -> Result<()> {
     let read = Log::read(path).and_then(|log| Ok((log.by_object(&name_of(path))?, log.skipped())));
     let (found, skipped) = match read {
-        Err(error @ Error::Io { .. }) => return Err(error),
+        Err(error) if error.is(&Kind::Io) => return Err(error),
         Err(error) => {
             findings.error(error);
             return Ok(());
@@ -212,7 +212,7 @@ fn read(path: &Path, longest: &Longest, findings: &mut Findings) -> Result<(Vec<
     for touch in text::numbered(&mut reader, path) {
         match touch {
             Ok(touch) => touches.push(touch),
-            Err(error @ Error::Io { .. }) => return Err(error),
+            Err(error) if error.is(&Kind::Io) => return Err(error),
             Err(error) => {
                 wrong += 1;
                 if wrong <= MOST_LINES {
@@ -225,7 +225,7 @@ fn read(path: &Path, longest: &Longest, findings: &mut Findings) -> Result<(Vec<
         findings.wrong(path, format!("{} more lines are wrong", wrong - MOST_LINES), "Correct them, or capture again.");
     }
     if let Err((line, problem)) = longest.check_all(touches.iter().map(|(line, touch)| (*line, touch))) {
-        findings.error(Error::at(Place::line(path, line), problem));
+        findings.error(Error::variant_at(Place::line(path, line), problem));
     }
     Ok((touches.into_iter().map(|(_, touch)| touch).collect(), reader.into_inner().checksum()))
 }
@@ -250,15 +250,12 @@ impl Findings {
     }
 
     fn problem(&mut self, path: &Path, problem: TouchesProblem) {
-        self.error(Error::at(Place::file(path), problem));
+        self.error(Error::variant_at(Place::file(path), problem));
     }
 
     fn error(&mut self, error: Error) {
-        let (what, fix) = match &error {
-            Error::At { place, problem } => (format!("{place}{problem}"), problem.fix()),
-            other => (other.to_string(), String::new()),
-        };
-        self.0.push(Finding { is_wrong: true, what, fix });
+        let what = format!("{}{}", error.place(), error.what());
+        self.0.push(Finding { is_wrong: true, what, fix: error.remedy().to_owned() });
     }
 
     /// Finds problems with all touches of an object together.

@@ -47,7 +47,7 @@ pub fn read(mut bytes: impl Read, path: &Path, each: impl FnMut(Message) -> Resu
                     McapError::BadMagic => Place::file(path),
                     _ => Place::byte(path, offset),
                 };
-                return Err(Error::at(place, problem(error)));
+                return Err(Error::variant_at(place, problem(error)));
             }
             Some(Ok(LinearReadEvent::ReadRequest(count))) => {
                 let buffer = reader.insert(count.clamp(1, STEP));
@@ -59,7 +59,7 @@ pub fn read(mut bytes: impl Read, path: &Path, each: impl FnMut(Message) -> Resu
                 };
                 // Said here, since a short text would be called a log that ends early.
                 if is_first && count > 0 && buffer[0] != MAGIC[0] {
-                    return Err(Error::at(Place::file(path), problem(McapError::BadMagic)));
+                    return Err(Error::variant_at(Place::file(path), problem(McapError::BadMagic)));
                 }
                 is_first = false;
                 reader.notify_read(count);
@@ -105,7 +105,7 @@ struct Channel {
 
 impl<F: FnMut(Message) -> Result<()>> Reading<'_, F> {
     fn record(&mut self, opcode: u8, data: &[u8], offset: u64) -> Result<()> {
-        let wrong = |problem| Error::at(Place::byte(self.path, offset), problem);
+        let wrong = |problem| Error::variant_at(Place::byte(self.path, offset), problem);
         match opcode {
             op::CHUNK => {
                 let records = Chunk::of(data).and_then(|chunk| chunk::records(&chunk)).map_err(wrong)?;
@@ -120,7 +120,7 @@ impl<F: FnMut(Message) -> Result<()>> Reading<'_, F> {
         while !records.is_empty() {
             let next = split(records).ok_or_else(|| {
                 let message = "a record is longer than the chunk that it stands in".into();
-                Error::at(Place::byte(self.path, offset), TouchesProblem::NotMcap { message })
+                Error::variant_at(Place::byte(self.path, offset), TouchesProblem::NotMcap { message })
             });
             let (opcode, data, rest) = next?;
             self.plain(opcode, data, offset)?;
@@ -132,7 +132,7 @@ impl<F: FnMut(Message) -> Result<()>> Reading<'_, F> {
     /// A record other than a chunk.
     fn plain(&mut self, opcode: u8, data: &[u8], offset: u64) -> Result<()> {
         let path = self.path;
-        let wrong = |problem| Error::at(Place::byte(path, offset), problem);
+        let wrong = |problem| Error::variant_at(Place::byte(path, offset), problem);
         match opcode {
             op::SCHEMA => {
                 let records::Schema { id, name, encoding, data } = records::Schema::of(data).map_err(wrong)?;
@@ -204,7 +204,7 @@ impl<F: FnMut(Message) -> Result<()>> Reading<'_, F> {
     }
 
     fn message(&mut self, message: &records::Message<'_>, offset: u64) -> Result<()> {
-        let wrong = |problem| Error::at(Place::byte(self.path, offset), problem);
+        let wrong = |problem| Error::variant_at(Place::byte(self.path, offset), problem);
         let Some(channel) = self.channels.get_mut(&message.channel) else {
             return Err(wrong(not_mcap(format!("a message of channel {}, which is missing", message.channel))));
         };
@@ -244,7 +244,7 @@ impl<F: FnMut(Message) -> Result<()>> Reading<'_, F> {
         }
         if channels.touches.is_empty() {
             let problem = TouchesProblem::NoTouchChannel { channels: channels.others };
-            return Err(Error::at(Place::file(self.path), problem));
+            return Err(Error::variant_at(Place::file(self.path), problem));
         }
         Ok(channels)
     }

@@ -101,7 +101,7 @@ impl Recording {
             return Err(TouchesProblem::BadName { name: name.into() }.into());
         }
         std::fs::create_dir_all(directory).map_err(|error| Error::io(directory, "make the directory", error))?;
-        let wrong = |problem| Error::at(Place::file(directory), problem);
+        let wrong = |problem| Error::variant_at(Place::file(directory), problem);
         let lock = output::lock(directory)?.ok_or_else(|| wrong(TouchesProblem::Busy))?;
         output::remove_leftovers(directory)?;
         let listing = match Listing::read(directory)? {
@@ -372,7 +372,7 @@ pub(super) fn read(entry: &Entry, path: &Path, longest: &Longest, warnings: &mut
     let bytes = match std::fs::read(path) {
         Err(error) if error.kind() == ErrorKind::NotFound && entry.touches == 0 => return Ok(Vec::new()),
         Err(error) if error.kind() == ErrorKind::NotFound => {
-            return Err(Error::at(Place::file(path), TouchesProblem::Missing { name: entry.name.clone() }));
+            return Err(Error::variant_at(Place::file(path), TouchesProblem::Missing { name: entry.name.clone() }));
         }
         read => read.map_err(|error| Error::io(path, "read the touches", error))?,
     };
@@ -380,7 +380,7 @@ pub(super) fn read(entry: &Entry, path: &Path, longest: &Longest, warnings: &mut
     let touches = text::within(whole, path, longest)?;
     let (stated, found) = (entry.touches, touches.len() as u64);
     if found < stated {
-        return Err(Error::at(Place::file(path), TouchesProblem::OtherCount { stated, found }));
+        return Err(Error::variant_at(Place::file(path), TouchesProblem::OtherCount { stated, found }));
     }
     if whole.len() < bytes.len() {
         warnings.push(Warning::HalfLine { path: path.into() });

@@ -2,7 +2,7 @@ mod located;
 
 use crate::fixtures::*;
 use palpate::capture::{Sampler, Settings, capture, in_memory, scenes, touches};
-use palpate::error::{CaptureProblem, Error, Result};
+use palpate::error::{CaptureProblem, Result};
 use palpate::mesh::Instance;
 use palpate::probe::approach::Approach;
 use palpate::probe::hand;
@@ -211,7 +211,7 @@ fn a_cancelled_capture_leaves_nothing_and_what_was_there_as_it_was() {
     let directory = place.path().join("data");
     let cancelled = |settings: &Settings| {
         let error = capture(&objects(), settings, &directory, &CancelAfter(1.into())).unwrap_err();
-        assert!(matches!(error, Error::Cancelled), "{error}");
+        assert!(error.is(&palpate::error::Kind::Cancelled), "{error}");
     };
     cancelled(&settings());
     assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 0);

@@ -84,7 +84,7 @@ pub const HEADER: &str = "palpate.h";
 /// Returns their paths.
 ///
 /// # Errors
-/// [`Setting`](crate::error::Setting) `output` for a name that a file may not have here; [`Error::Io`].
+/// [`Kind::Setting`](crate::error::Kind::Setting) `output` for a name that a file may not have here; [`Kind::Io`](crate::error::Kind::Io).
 pub fn write_sources(path: &Path, files: &[(&'static str, String)]) -> Result<Vec<PathBuf>> {
     let places: Vec<PathBuf> = files.iter().map(|(extension, _)| path.with_extension(extension)).collect();
     for place in &places {
@@ -102,7 +102,7 @@ pub fn write_sources(path: &Path, files: &[(&'static str, String)]) -> Result<Ve
 /// Refuses a place beside `path` that source code may not have.
 ///
 /// # Errors
-/// [`Setting`](crate::error::Setting) `output`, like [`write_sources`].
+/// [`Kind::Setting`](crate::error::Kind::Setting) `output`, like [`write_sources`].
 pub fn check_place(path: &Path, place: &Path) -> Result<()> {
     // A name such as .palpate has no stem, and what is beside it would be hidden.
     let is_hidden = path.file_name().is_none_or(|name| name.as_encoded_bytes().starts_with(b"."));

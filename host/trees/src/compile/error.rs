@@ -1,7 +1,7 @@
 //! Problems with compiling, and compiled models.
 
-use crate::error::Problem;
 use crate::error::TreeProblem;
+use crate::error::Variant;
 use palpate_onboard::ModelError;
 
 /// Problems with compiling, and compiled models.
@@ -117,7 +117,7 @@ pub enum CompileProblem {
     },
 }
 
-impl Problem for CompileProblem {
+impl Variant for CompileProblem {
     fn fix(&self) -> String {
         match self {
             Self::Maps => {

@@ -172,7 +172,7 @@ pub struct Compiled {
 /// When recognizers stop.
 ///
 /// # Errors
-/// [`Setting`](crate::error::Setting) `error_rate` or `max_touches`, whichever is out of its range.
+/// [`Kind::Setting`](crate::error::Kind::Setting) `error_rate` or `max_touches`, whichever is out of its range.
 pub fn stopping(error_rate: f64, max_touches: u32) -> Result<Stopping> {
     if max_touches == 0 {
         return Err(Error::setting("max_touches", 0, "at least 1"));
@@ -186,7 +186,7 @@ pub fn stopping(error_rate: f64, max_touches: u32) -> Result<Stopping> {
 /// # Errors
 /// [`CompileProblem`] for an ensemble that contradicts itself, has leaves that are not finite or too large, thresholds
 /// that fall together when rounded to whole numbers, more of something than the format can count, or that no code can be
-/// written of, if that is asked for; [`Setting`](crate::error::Setting) for settings out of their ranges.
+/// written of, if that is asked for; [`Kind::Setting`](crate::error::Kind::Setting) for settings out of their ranges.
 pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
     let original = ensemble;
     let Held { ensemble, scales, rounding } = range::held(ensemble, settings.leaf);

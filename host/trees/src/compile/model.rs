@@ -24,7 +24,7 @@ impl CompiledModel {
     /// Reads and checks a model.
     ///
     /// # Errors
-    /// [`Error::Io`] when the file cannot be read; [`CompileProblem::Model`] at the byte where it goes wrong when it is
+    /// [`Kind::Io`](crate::error::Kind::Io) when the file cannot be read; [`CompileProblem::Model`] at the byte where it goes wrong when it is
     /// not a model of this version, whole and unchanged.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
@@ -40,11 +40,11 @@ impl CompiledModel {
         match Model::new(&bytes) {
             Ok(_) => Ok(Self { path: Some(path.into()), bytes }),
             Err(_) if bytes.starts_with(&MAGIC) && Header::of(&bytes).layout() == MAPS_LAYOUT => {
-                Err(Error::at(Place::file(path), CompileProblem::Maps))
+                Err(Error::variant_at(Place::file(path), CompileProblem::Maps))
             }
             Err(error) => {
                 let offset = u64::try_from(error.offset()).unwrap_or(u64::MAX);
-                Err(Error::at(Place::byte(path, offset), CompileProblem::Model(error)))
+                Err(Error::variant_at(Place::byte(path, offset), CompileProblem::Model(error)))
             }
         }
     }

@@ -1,6 +1,6 @@
 //! Problems with ensembles and their files.
 
-use crate::error::Problem;
+use crate::error::Variant;
 
 /// Problems with ensembles and their files.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -319,7 +319,7 @@ fn bad_name(name: &str, why: NameProblem) -> String {
     }
 }
 
-impl Problem for EnsembleProblem {
+impl Variant for EnsembleProblem {
     fn fix(&self) -> String {
         match self {
             Self::Unsupported { way, .. } => way.clone(),

@@ -1,6 +1,6 @@
 //! Problems with proofs.
 
-use crate::error::Problem;
+use crate::error::Variant;
 
 /// Problems with proofs.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -78,7 +78,7 @@ pub enum ProofProblem {
     },
 }
 
-impl Problem for ProofProblem {
+impl Variant for ProofProblem {
     fn fix(&self) -> String {
         match self {
             Self::Format { .. } => "Export the model again.",

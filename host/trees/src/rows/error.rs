@@ -1,7 +1,7 @@
 //! Problems with rows of features, and with comparing models on them.
 
 use crate::ensemble::Columns;
-use crate::error::Problem;
+use crate::error::Variant;
 
 /// Advice on the margins that `verify` compares with.
 const RAW_SCORES: &str = "Give the library's raw scores, before the softmax or the logistic function: one column per output, or one for a binary model (its second class), in the order of the classes. XGBoost: `output_margin=True`; LightGBM: `raw_score=True`; CatBoost: `prediction_type=\"RawFormulaVal\"`; scikit-learn: `decision_function`, of forests `predict_proba`; onnxruntime: a model converted with `options={id(model): {\"raw_scores\": True}}`, of forests its probabilities.";
@@ -274,7 +274,7 @@ impl RowsProblem {
     }
 }
 
-impl Problem for RowsProblem {
+impl Variant for RowsProblem {
     fn fix(&self) -> String {
         match self {
             Self::NotRows { .. } => "Give a header line with the features' names, then one row per line.",

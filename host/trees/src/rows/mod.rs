@@ -51,7 +51,7 @@ impl Rows {
     /// Columns are matched as [`Features::among`] does it. The column `label` is no feature.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`RowsProblem`] naming the line: a file that is not such a table or has no rows, columns that cannot
+    /// [`Kind::Io`](crate::error::Kind::Io); [`RowsProblem`] naming the line: a file that is not such a table or has no rows, columns that cannot
     /// be matched, a cell that is not a number, an empty line.
     pub fn read(path: &Path, features: impl Into<Features>, label: Option<&str>) -> Result<Self> {
         let features = features.into();
@@ -66,14 +66,14 @@ impl Rows {
                 let text = record.get(column).unwrap_or_default();
                 let value = number(text).ok_or_else(|| {
                     let column = header.get(column).copied().unwrap_or_default().to_owned();
-                    Error::at(Place::line(path, line), RowsProblem::Number { column, text: text.into() })
+                    Error::variant_at(Place::line(path, line), RowsProblem::Number { column, text: text.into() })
                 })?;
                 values.push(value);
             }
             labels.extend(label.map(|column| record.get(column).unwrap_or_default().to_owned()));
         }
         if values.is_empty() {
-            return Err(Error::at(Place::file(path), RowsProblem::Empty));
+            return Err(Error::variant_at(Place::file(path), RowsProblem::Empty));
         }
         Ok(Self { features: features.count(), values, labels, by_position: matched.by_position })
     }
@@ -97,7 +97,7 @@ impl Rows {
 /// Reads a CSV file of margins: no header, one row per line, as many numbers in each.
 ///
 /// # Errors
-/// [`Error::Io`]; [`RowsProblem`] naming the line.
+/// [`Kind::Io`](crate::error::Kind::Io); [`RowsProblem`] naming the line.
 pub fn read_margins(path: &Path) -> Result<Vec<Vec<f64>>> {
     let finite = |text: &str| text.parse::<f64>().ok().filter(|margin| margin.is_finite());
     let table = Table::without_header(path, "read the margins")?;
@@ -105,7 +105,7 @@ pub fn read_margins(path: &Path) -> Result<Vec<Vec<f64>>> {
         let (line, record) = record?;
         let number = |(column, text): (usize, &str)| {
             let problem = || RowsProblem::Number { column: (column + 1).to_string(), text: text.into() };
-            finite(text).ok_or_else(|| Error::at(Place::line(path, line), problem()))
+            finite(text).ok_or_else(|| Error::variant_at(Place::line(path, line), problem()))
         };
         record.iter().enumerate().map(number).collect()
     };
@@ -115,7 +115,7 @@ pub fn read_margins(path: &Path) -> Result<Vec<Vec<f64>>> {
 /// Reads a CSV file of a library's predictions: no header, one row per line, a class or a value in each, or one for each target.
 ///
 /// # Errors
-/// [`Error::Io`]; [`RowsProblem`] naming the line.
+/// [`Kind::Io`](crate::error::Kind::Io); [`RowsProblem`] naming the line.
 pub fn read_values(path: &Path) -> Result<Vec<Vec<String>>> {
     let table = Table::without_header(path, "read the values")?;
     table.records().map(|record| Ok(record?.1.iter().map(String::from).collect())).collect()

@@ -140,7 +140,7 @@ impl Sequences {
     /// as by [`Rows::read`](super::Rows::read).
     ///
     /// # Errors
-    /// [`Error::Io`]; [`RowsProblem`] naming the line, as [`SequencesBuilder::push`], and for a column that is not there
+    /// [`Kind::Io`](crate::error::Kind::Io); [`RowsProblem`] naming the line, as [`SequencesBuilder::push`], and for a column that is not there
     /// or a cell that is not a number.
     pub fn read(
         path: &Path,
@@ -177,13 +177,13 @@ impl Sequences {
     ) -> Result<Self> {
         let position = |name: &str| {
             let found = header.iter().position(|column| *column == name);
-            found.ok_or_else(|| Error::at(place(1), RowsProblem::NoColumn { name: name.into() }))
+            found.ok_or_else(|| Error::variant_at(place(1), RowsProblem::NoColumn { name: name.into() }))
         };
         let [label, group] = [names.label.map(&position).transpose()?, names.group.map(&position).transpose()?];
         let sequence = position(names.sequence)?;
         let others: Vec<usize> = [sequence].into_iter().chain(label).chain(group).collect();
         let features = features.into();
-        let matched = features.among(header, &others).map_err(|problem| Error::at(place(1), problem))?;
+        let matched = features.among(header, &others).map_err(|problem| Error::variant_at(place(1), problem))?;
         let mut builder = SequencesBuilder::new(features.count(), classes);
         let mut values = vec![0.0; features.count()];
         for record in records {
@@ -192,13 +192,13 @@ impl Sequences {
             for (value, &column) in values.iter_mut().zip(&matched.columns) {
                 *value = number(cell(column)).ok_or_else(|| {
                     let name = header.get(column).copied().unwrap_or_default().to_owned();
-                    Error::at(place(line), RowsProblem::Number { column: name, text: cell(column).into() })
+                    Error::variant_at(place(line), RowsProblem::Number { column: name, text: cell(column).into() })
                 })?;
             }
             let row = RowOf { label: label.map_or("0", cell), sequence: cell(sequence), group: group.map(cell) };
-            builder.push(&values, row).map_err(|problem| Error::at(place(line), problem))?;
+            builder.push(&values, row).map_err(|problem| Error::variant_at(place(line), problem))?;
         }
-        let built = builder.finish().map_err(|problem| Error::at(place(1), problem))?;
+        let built = builder.finish().map_err(|problem| Error::variant_at(place(1), problem))?;
         Ok(Self { by_position: matched.by_position, ..built })
     }
 

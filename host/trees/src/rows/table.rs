@@ -17,7 +17,7 @@ impl Table {
     /// Reads a file; its first line is a header.
     ///
     /// # Errors
-    /// [`Error::Io`], and [`RowsProblem`] if it is not text.
+    /// [`Kind::Io`](crate::error::Kind::Io), and [`RowsProblem`] if it is not text.
     pub(super) fn read(path: &Path) -> Result<Self> {
         let mut table = Self::without_header(path, "read the rows")?;
         table.has_header = true;
@@ -29,7 +29,7 @@ impl Table {
     /// Reads a file whose first line is a record like the others.
     ///
     /// # Errors
-    /// [`Error::Io`], where `action` failed.
+    /// [`Kind::Io`](crate::error::Kind::Io), where `action` failed.
     pub(super) fn without_header(path: &Path, action: &'static str) -> Result<Self> {
         let bytes = std::fs::read(path).map_err(|source| Error::io(path, action, source))?;
         Ok(Self { path: path.into(), bytes, header: Vec::new(), has_header: false })
@@ -44,14 +44,14 @@ impl Table {
     /// separates.
     pub(super) fn in_header(&self, problem: RowsProblem) -> Error {
         if self.header.iter().all(String::is_empty) {
-            return Error::at(Place::file(&self.path), RowsProblem::Empty);
+            return Error::variant_at(Place::file(&self.path), RowsProblem::Empty);
         }
         let separator = match self.header.as_slice() {
             [only] => [';', '\t'].into_iter().find(|separator| only.contains(*separator)),
             _ => None,
         };
         let problem = separator.map_or(problem, |separator| RowsProblem::Separator { separator });
-        Error::at(Place::line(&self.path, 1), problem)
+        Error::variant_at(Place::line(&self.path, 1), problem)
     }
 
     /// The position of a column.
@@ -87,7 +87,7 @@ impl Table {
                     from = reader.position().byte();
                     Some(match lines.first(start) {
                         Ok(line) => Ok((line, record)),
-                        Err(line) => Err(Error::at(Place::line(&self.path, line), RowsProblem::EmptyLine)),
+                        Err(line) => Err(Error::variant_at(Place::line(&self.path, line), RowsProblem::EmptyLine)),
                     })
                 }
             }
@@ -113,7 +113,7 @@ impl Table {
             }
             None => Place::file(&self.path),
         };
-        Error::at(place, problem)
+        Error::variant_at(place, problem)
     }
 }
 

@@ -150,7 +150,7 @@ const BATCH: usize = 4096;
 ///
 /// # Errors
 /// [`RowsProblem`] if model, ensemble, rows and the library's answers do not belong together;
-/// [`Error::Cancelled`](crate::Error::Cancelled).
+/// [`Kind::Cancelled`](crate::error::Kind::Cancelled).
 pub fn verify(
     model: &Model<'_>,
     ensemble: &Ensemble,

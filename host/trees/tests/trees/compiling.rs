@@ -7,7 +7,7 @@ use palpate_trees::compile::{
     Compiled, CompiledModel, Layout, Leaf, Restated, Settings, compile, compile_within, names, open, restate,
 };
 use palpate_trees::ensemble::{Ensemble, Inputs, Node, Output, Tree};
-use palpate_trees::error::{CompileProblem, Problem, Setting, TreeProblem};
+use palpate_trees::error::{CompileProblem, Kind, TreeProblem, Variant};
 use palpate_trees::shared::format::f32_key;
 use palpate_trees::shared::{Descriptor, MISSING_FEATURE};
 
@@ -36,8 +36,8 @@ pub(crate) fn refusal(ensemble: &Ensemble, settings: &Settings) -> CompileProble
 fn setting(settings: &Settings) -> &'static str {
     let error = compile(&stump(500.0, [[1.0, -1.0], [-1.0, 1.0]]), settings).unwrap_err();
     assert_eq!(error.exit_code(), 2);
-    match error.problem() {
-        Some(Setting { name, .. }) => name,
+    match error.kind() {
+        Kind::Setting { name, .. } => name,
         other => panic!("{other:?}"),
     }
 }
@@ -234,7 +234,7 @@ fn thresholds_that_fall_together_when_rounded_are_refused_by_their_feature() {
     compile(&rows, &with!(Settings::default(), leaf = Leaf::F32)).unwrap();
     for scales in [vec![1.0], vec![1.0, 0.0], vec![f32::NAN, 1.0]] {
         let error = compile(&rows, &with!(Settings::default(), scales = Some(scales))).unwrap_err();
-        assert!(matches!(error.problem::<Setting>(), Some(Setting { name: "scales", .. })), "{error}");
+        assert!(matches!(error.kind(), Kind::Setting { name: "scales", .. }), "{error}");
     }
     // Whole thresholds, and halves between neighbors, are what trainers put between whole numbers.
     for step in [1.0, 0.5] {

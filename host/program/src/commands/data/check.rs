@@ -27,7 +27,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
     global.print(&check, || text(&check))?;
     match check.wrong() {
         0 => Ok(()),
-        count => Err(Error::at(Place::file(&arguments.directory), TouchesProblem::WouldTrainWrong { count })),
+        count => Err(Error::variant_at(Place::file(&arguments.directory), TouchesProblem::WouldTrainWrong { count })),
     }
 }
 

@@ -101,7 +101,7 @@ fn read(mut lines: impl BufRead, source: &Path, object: &str, longest: &Longest)
     }
     let touches = text::within(lines, source, longest)?;
     match touches.is_empty() {
-        true => Err(Error::at(palpate::error::Place::file(source), palpate::error::TouchesProblem::NoTouches)),
+        true => Err(Error::variant_at(palpate::error::Place::file(source), palpate::error::TouchesProblem::NoTouches)),
         false => Ok(touches),
     }
 }

@@ -138,7 +138,7 @@ fn model_of_touches(path: &Path) -> Result<Vec<u8>> {
     let compiled = CompiledModel::read(path)?;
     match compiled.model().descriptor() {
         Some(_) => Ok(compiled.bytes().to_vec()),
-        None => Err(Error::at(Place::file(path), ChipProblem::Rows)),
+        None => Err(Error::variant_at(Place::file(path), ChipProblem::Rows)),
     }
 }
 

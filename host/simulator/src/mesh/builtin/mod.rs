@@ -73,7 +73,7 @@ pub fn all() -> Result<Vec<Object>> {
 /// The built-in object `name`, the same that [`all`] gives.
 ///
 /// # Errors
-/// [`Setting`](crate::error::Setting) if there is no such object; as [`all`].
+/// [`Kind::Setting`](crate::error::Kind::Setting) if there is no such object; as [`all`].
 pub fn one(name: &str) -> Result<Object> {
     make_one(&kind(name)?, None)
 }
@@ -82,7 +82,7 @@ pub fn one(name: &str) -> Result<Object> {
 /// same seed gives the same object. It has the kind's name.
 ///
 /// # Errors
-/// [`Setting`](crate::error::Setting) if there is no such kind; [`MeshProblem::NotMeshed`] if the
+/// [`Kind::Setting`](crate::error::Kind::Setting) if there is no such kind; [`MeshProblem::NotMeshed`] if the
 /// proportions that the seed gives have no closed mesh.
 pub fn varied(name: &str, seed: u64) -> Result<Object> {
     make_one(&kind(name)?, Some(seed))

@@ -26,7 +26,7 @@ use std::path::Path;
 /// face is left.
 pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<(Moved, Option<f64>, Vec<String>)> {
     let text = text(bytes, path)?;
-    let here = |problem| Error::at(Place::file(path), problem);
+    let here = |problem| Error::variant_at(Place::file(path), problem);
     let document = Document::parse(&text).map_err(|error| {
         let what = match &error {
             roxmltree::Error::DtdDetected => "it has a document type declaration, which is not read".into(),
@@ -39,7 +39,7 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<(Moved, Option<f64>, Ve
             0 => Place::file(path),
             row => Place::line(path, row.into()),
         };
-        Error::at(place, damaged(what))
+        Error::variant_at(place, damaged(what))
     })?;
     let root = document.root_element();
     if !named(root, "COLLADA") {
@@ -55,7 +55,7 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<(Moved, Option<f64>, Ve
     let millimeters = scene.fill(root).and_then(|()| millimeters(root)).map_err(|Wrong { node, line, problem }| {
         let position = document.get_node(node).map_or(0, |node| node.range().start);
         let row = u64::from(document.text_pos_at(position).row);
-        Error::at(Place::line(path, row + line), problem)
+        Error::variant_at(Place::line(path, row + line), problem)
     })?;
     let note = || format!("{} states no upward axis: y is up, by the standard of COLLADA", path.display());
     let notes = if stated(root, "up_axis").is_none() { vec![note()] } else { Vec::new() };
@@ -74,7 +74,7 @@ fn text(bytes: &[u8], path: &Path) -> Result<String> {
                 return Ok(bytes.iter().map(|&byte| char::from(byte)).collect());
             }
             let what = "it is not text in UTF-8".into();
-            Err(Error::at(Place::byte(path, error.valid_up_to() as u64), damaged(what)))
+            Err(Error::variant_at(Place::byte(path, error.valid_up_to() as u64), damaged(what)))
         }
     }
 }

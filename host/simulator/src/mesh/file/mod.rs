@@ -94,7 +94,7 @@ const MOST_OF_A_PIPE: u64 = 1 << 30;
 /// Memory: at most 256 bytes for each byte of the file (and of those that a glTF file names), and 1 MB.
 ///
 /// # Errors
-/// [`Error::Io`] when the file cannot be read; a [`MeshProblem`] with its line or byte where the file is damaged, or uses
+/// [`Kind::Io`](crate::error::Kind::Io) when the file cannot be read; a [`MeshProblem`] with its line or byte where the file is damaged, or uses
 /// unsupported features, and with the file when there is no face or each is a single point.
 pub fn read(path: &Path) -> Result<Contents> {
     let io = |source| Error::io(path, "read the mesh", source);
@@ -106,7 +106,7 @@ pub fn read(path: &Path) -> Result<Contents> {
     let mut bytes = Vec::new();
     file.take(MOST_OF_A_PIPE + 1).read_to_end(&mut bytes).map_err(io)?;
     if bytes.len() as u64 > MOST_OF_A_PIPE {
-        return Err(Error::at(Place::file(path), MeshProblem::TooLarge { limit: MOST_OF_A_PIPE }));
+        return Err(Error::variant_at(Place::file(path), MeshProblem::TooLarge { limit: MOST_OF_A_PIPE }));
     }
     parse_buffered(bytes.as_slice(), bytes.len() as u64, path, path.parent())
 }
@@ -138,7 +138,7 @@ fn not_obj(error: Error, path: &Path) -> Error {
         return error;
     }
     let what = "a file that is neither OBJ, STL, PLY, glTF nor COLLADA".into();
-    Error::at(Place::file(path), MeshProblem::Unsupported { what, instead: "Export a mesh as one of these" })
+    Error::variant_at(Place::file(path), MeshProblem::Unsupported { what, instead: "Export a mesh as one of these" })
 }
 
 fn parse_usual(mut reader: impl BufRead, length: u64, path: &Path, folder: Option<&Path>) -> Result<Contents> {
@@ -147,7 +147,7 @@ fn parse_usual(mut reader: impl BufRead, length: u64, path: &Path, folder: Optio
     if !stl::is_binary(head, length)
         && let Some(problem) = unread::problem(head, path)
     {
-        return Err(Error::at(Place::file(path), problem));
+        return Err(Error::variant_at(Place::file(path), problem));
     }
     let mut notes = Vec::new();
     let format = Format::of_usual(head, length, path.extension().and_then(|extension| extension.to_str()));

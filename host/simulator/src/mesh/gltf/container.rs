@@ -24,14 +24,14 @@ pub(super) fn parts<'a>(bytes: &'a [u8], path: &Path) -> Result<Parts<'a>> {
     }
     let number = |offset: usize| bytes.get(offset..)?.first_chunk().map(|bytes| u32::from_le_bytes(*bytes));
     let wrong = |offset: usize, what: String| {
-        Error::at(Place::byte(path, offset as u64), MeshProblem::Damaged { format: "GLB", what })
+        Error::variant_at(Place::byte(path, offset as u64), MeshProblem::Damaged { format: "GLB", what })
     };
     match (number(4), number(8)) {
         (Some(2), Some(length)) if length as usize == bytes.len() => {}
         (Some(2), Some(length)) => {
             return Err(wrong(8, format!("it states a length of {length} bytes, but has {}", bytes.len())));
         }
-        (Some(version), Some(_)) => return Err(Error::at(Place::byte(path, 4), super::other_version(version))),
+        (Some(version), Some(_)) => return Err(Error::variant_at(Place::byte(path, 4), super::other_version(version))),
         _ => return Err(wrong(bytes.len(), "it ends in its header".into())),
     }
     let (mut json, mut binary) = (None, None);
@@ -100,7 +100,7 @@ fn outside(uri: &str, index: usize, buffer: &Buffer, path: &Path, folder: Option
         return decoded.map_err(|error| damaged(path, format!("buffers[{index}] is not valid base64: {error}")));
     }
     let unsupported =
-        |what: String, instead| Err(Error::at(Place::file(path), MeshProblem::Unsupported { what, instead }));
+        |what: String, instead| Err(Error::variant_at(Place::file(path), MeshProblem::Unsupported { what, instead }));
     let name = unescaped(uri);
     let beside = Path::new(&name);
     let is_beside =
@@ -123,7 +123,7 @@ fn outside(uri: &str, index: usize, buffer: &Buffer, path: &Path, folder: Option
             file.take(1024).read_to_end(&mut head).map_err(io)?;
         }
         if is_pointer(&head) {
-            return Err(Error::at(Place::file(&place), MeshProblem::LfsPointer));
+            return Err(Error::variant_at(Place::file(&place), MeshProblem::LfsPointer));
         }
         let what = format!("buffers[{index}] of {} states {} bytes", path.display(), buffer.byte_length);
         return Err(damaged(&place, format!("{what}, but the file has {}", metadata.len())));

@@ -28,7 +28,7 @@ pub(super) fn parse(bytes: &[u8], path: &Path, folder: Option<&Path>) -> Result<
     let parts = container::parts(bytes, path)?;
     let document: Document = serde_json::from_slice(parts.json).map_err(|error| {
         if serde_json::from_slice::<document::Version1>(parts.json).is_ok() {
-            return Error::at(Place::file(path), other_version("1.0"));
+            return Error::variant_at(Place::file(path), other_version("1.0"));
         }
         let mut reason = error.to_string();
         reason.truncate(reason.rfind(" at line ").unwrap_or(reason.len()));
@@ -36,9 +36,9 @@ pub(super) fn parse(bytes: &[u8], path: &Path, folder: Option<&Path>) -> Result<
             start @ 4.. => Place::byte(path, start + offset(parts.json, error.line(), error.column())),
             _ => Place::line(path, error.line().max(1) as u64),
         };
-        Error::at(place, MeshProblem::Damaged { format: "glTF", what: reason.chars().take(200).collect() })
+        Error::variant_at(place, MeshProblem::Damaged { format: "glTF", what: reason.chars().take(200).collect() })
     })?;
-    let here = |problem| Error::at(Place::file(path), problem);
+    let here = |problem| Error::variant_at(Place::file(path), problem);
     check(&document).map_err(here)?;
     let buffers = container::buffers(&document, &parts, path, folder)?;
     let length = bytes.len() as u64 + buffers.iter().flatten().map(|buffer| buffer.len() as u64).sum::<u64>();
@@ -56,7 +56,7 @@ pub(super) fn parse(bytes: &[u8], path: &Path, folder: Option<&Path>) -> Result<
 
 /// Something is wrong with a file as a whole.
 fn damaged(path: &Path, what: String) -> Error {
-    Error::at(Place::file(path), accessor::damaged(what))
+    Error::variant_at(Place::file(path), accessor::damaged(what))
 }
 
 /// Offset of a line and a column (both from 1) in a text.

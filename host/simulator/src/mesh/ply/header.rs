@@ -51,8 +51,9 @@ impl Header {
             let read = read.map_err(|source| Error::io(path, "read the mesh", source))?;
             bytes += read as u64;
             lines += 1;
-            let damaged =
-                |what: String| Error::at(Place::line(path, lines), MeshProblem::Damaged { format: "PLY", what });
+            let damaged = |what: String| {
+                Error::variant_at(Place::line(path, lines), MeshProblem::Damaged { format: "PLY", what })
+            };
             let words: Vec<&[u8]> = raw.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()).collect();
             if lines == 1 && words != [b"ply"] {
                 let is_of_old_mac = raw.starts_with(b"ply\r") && !raw.ends_with(b"\r\n");
@@ -98,7 +99,7 @@ impl Header {
             }
         }
         let whole = |line: u64, what: &str| {
-            Error::at(Place::line(path, line), MeshProblem::Damaged { format: "PLY", what: what.into() })
+            Error::variant_at(Place::line(path, line), MeshProblem::Damaged { format: "PLY", what: what.into() })
         };
         let format = format.ok_or_else(|| whole(lines, "its header has no line \"format ... 1.0\""))?;
         elements.retain(|element| element.count > 0 || !element.properties.is_empty());

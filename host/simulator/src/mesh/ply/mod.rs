@@ -30,13 +30,13 @@ use std::path::Path;
 pub(super) fn parse(mut reader: impl BufRead, path: &Path) -> Result<Moved> {
     let Header { format, text, bytes, lines, is_cloud } = Header::read(&mut reader, path)?;
     if is_cloud {
-        return Err(Error::at(Place::file(path), unread::cloud()));
+        return Err(Error::variant_at(Place::file(path), unread::cloud()));
     }
     let is_text = format == PlyFormat::Ascii;
     let counts = Counts::starting_at(bytes, lines);
     let damaged = |what: String| {
         let place = if is_text { Place::line(path, counts.line.get()) } else { Place::byte(path, counts.byte.get()) };
-        Error::at(place, MeshProblem::Damaged { format: "PLY", what })
+        Error::variant_at(place, MeshProblem::Damaged { format: "PLY", what })
     };
     // The end of a text ends its last number too.
     let end: &[u8] = if is_text { b"\n" } else { b"" };
@@ -67,7 +67,7 @@ pub(super) fn parse(mut reader: impl BufRead, path: &Path) -> Result<Moved> {
             length => reader.consume(length),
         }
     }
-    let here = |problem| Error::at(Place::file(path), problem);
+    let here = |problem| Error::variant_at(Place::file(path), problem);
     let offset = Bounds::of(faces.used(&vertices.0).chain(strips.used(&vertices.0))).offset();
     let rounded = vertices.0.iter().map(|&vertex| rounded(vertex, offset)).collect();
     let mut mesh = Mesh { vertices: rounded, triangles: Vec::new() };

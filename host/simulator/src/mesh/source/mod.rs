@@ -90,11 +90,7 @@ fn refuse(mut errors: Vec<Error>, count: usize) -> Result<()> {
 
 /// An error without advice.
 fn said(error: &Error) -> String {
-    match error {
-        Error::At { place, problem } => format!("{place}{problem}"),
-        Error::Io { path, action, source, .. } => format!("{}: cannot {action}: {source}", path.display()),
-        other => other.to_string(),
-    }
+    format!("{}{}", error.place(), error.what())
 }
 
 /// Notes on objects that have the same mesh, which no touch distinguishes.
@@ -128,7 +124,7 @@ pub fn object(source: &str) -> Result<Object> {
             object.notes.extend(note);
             Ok(object)
         }
-        (_, others) => Err(Error::at(Place::file(source), MeshProblem::SeveralObjects { count: others + 1 })),
+        (_, others) => Err(Error::variant_at(Place::file(source), MeshProblem::SeveralObjects { count: others + 1 })),
     }
 }
 
@@ -305,7 +301,7 @@ fn found(sources: &[String], search: Search) -> Result<(Vec<Source>, Option<Stri
             let path = Path::new(source);
             let metadata = std::fs::metadata(path).map_err(|error| match error.kind() {
                 std::io::ErrorKind::NotFound => {
-                    Error::at(Place::file(path), MeshProblem::NoSuchSource { builtin: builtin::names().into() })
+                    Error::variant_at(Place::file(path), MeshProblem::NoSuchSource { builtin: builtin::names().into() })
                 }
                 _ => Error::io(path, "read the mesh", error),
             })?;
@@ -321,7 +317,7 @@ fn found(sources: &[String], search: Search) -> Result<(Vec<Source>, Option<Stri
                 }
                 if finder.found.len() + found.len() == before {
                     let problem = finder.note().map_or(MeshProblem::NoMeshes, |files| MeshProblem::NoneRead { files });
-                    return Err(Error::at(Place::file(path), problem));
+                    return Err(Error::variant_at(Place::file(path), problem));
                 }
             } else {
                 finder.found.push(Found { path: path.to_owned(), passed: Vec::new() });

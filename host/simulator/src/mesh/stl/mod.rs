@@ -50,7 +50,7 @@ pub(super) fn parse(mut reader: impl BufRead, length: u64, path: &Path) -> Resul
         (welder, note, step)
     };
     let (mesh, moved) = Mesh::from_f64(&welder.vertices, welder.triangles);
-    let mesh = mesh.usable().map_err(|problem| Error::at(Place::file(path), problem))?;
+    let mesh = mesh.usable().map_err(|problem| Error::variant_at(Place::file(path), problem))?;
     let notes = note.into_iter().map(|note| format!("{} {note}", path.display())).collect();
     Ok(((mesh, moved, step), notes))
 }
@@ -74,7 +74,7 @@ fn binary(mut reader: impl BufRead, length: u64, path: &Path) -> Result<Noted> {
     let count = stated(&header).unwrap_or_default();
     let other_length = || {
         let what = format!("it states {count} triangles, which are {} bytes, but has {length} bytes", bytes_of(count));
-        Error::at(Place::byte(path, HEADER as u64 - 4), MeshProblem::Damaged { format: "STL", what })
+        Error::variant_at(Place::byte(path, HEADER as u64 - 4), MeshProblem::Damaged { format: "STL", what })
     };
     let rest = length.checked_sub(bytes_of(count)).filter(|&rest| rest == 0 || count > 0).ok_or_else(other_length)?;
     let mut welder = Welder::default();
@@ -93,10 +93,10 @@ fn binary(mut reader: impl BufRead, length: u64, path: &Path) -> Result<Noted> {
                 if !value.is_finite() {
                     let problem = MeshProblem::NotFinite { axis: AXES[axis], text: value.to_string() };
                     let offset = start + 12 + 12 * number as u64 + 4 * axis as u64;
-                    return Err(Error::at(Place::byte(path, offset), problem));
+                    return Err(Error::variant_at(Place::byte(path, offset), problem));
                 }
             }
-            *corner = welder.corner(vertex).map_err(|problem| Error::at(Place::byte(path, start), problem))?;
+            *corner = welder.corner(vertex).map_err(|problem| Error::variant_at(Place::byte(path, start), problem))?;
         }
         welder.triangles.push(corners);
     }
@@ -114,7 +114,7 @@ const AXES: [char; 3] = ['x', 'y', 'z'];
 fn ended(source: std::io::Error, path: &Path, offset: u64) -> Error {
     if source.kind() == ErrorKind::UnexpectedEof {
         let what = "it ends in the middle of a triangle or of its header".into();
-        return Error::at(Place::byte(path, offset), MeshProblem::Damaged { format: "STL", what });
+        return Error::variant_at(Place::byte(path, offset), MeshProblem::Damaged { format: "STL", what });
     }
     Error::io(path, "read the mesh", source)
 }
@@ -272,7 +272,7 @@ impl<R: BufRead> Text<'_, R> {
     }
 
     fn here(&self, problem: MeshProblem) -> Error {
-        Error::at(Place::line(self.path, self.line.max(1)), problem)
+        Error::variant_at(Place::line(self.path, self.line.max(1)), problem)
     }
 
     fn unexpected(&self, word: Option<Vec<u8>>, expected: &str) -> Error {

@@ -271,7 +271,7 @@ impl Noise {
     /// Refuses noise that cannot be.
     ///
     /// # Errors
-    /// [`Setting`](crate::error::Setting) that names the field, `noise` for the deviation.
+    /// [`Kind::Setting`](crate::error::Kind::Setting) that names the field, `noise` for the deviation.
     pub fn check(&self) -> Result<()> {
         let Deviation { least, largest } = self.deviation;
         if !(0.0 <= least && least <= largest && largest.is_finite()) {

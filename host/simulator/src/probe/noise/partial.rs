@@ -1,7 +1,7 @@
 //! Settings of noise as users write them in one text: `noise=0..5ms,timer=1ms,missed=2%`.
 
 use super::{Deviation, Noise, quantity};
-use crate::error::{ProbeProblem, Setting};
+use crate::error::{Kind, ProbeProblem};
 use crate::probe::approach::FINGERS;
 use std::fmt;
 use std::str::FromStr;
@@ -179,8 +179,10 @@ impl PartialNoise {
         match self.over(Noise::default()).check() {
             Ok(()) => Ok(()),
             Err(error) => {
-                let wanted =
-                    error.problem::<Setting>().map_or_else(|| error.to_string(), |wrong| wrong.allowed.clone());
+                let wanted = match error.kind() {
+                    Kind::Setting { allowed, .. } => allowed.clone(),
+                    _ => error.to_string(),
+                };
                 Err(BadNoise { key: key.into(), value: value.into(), wanted })
             }
         }

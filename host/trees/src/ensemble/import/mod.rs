@@ -85,7 +85,7 @@ pub fn read(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ensemble
         let Some(imported) = ensemble.origin.imported.as_mut() else {
             let of = ensemble.schema().map_or("other features", |schema| schema.of);
             let what = format!("it is over {of}, where no number stands for a missing contact");
-            return Err(Error::at(Place::file(path), unsupported(what, "Leave the missing value out.")));
+            return Err(Error::variant_at(Place::file(path), unsupported(what, "Leave the missing value out.")));
         };
         imported.sentinel = Some([missing; 2]);
     }
@@ -94,7 +94,7 @@ pub fn read(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ensemble
 
 fn read_as_it_is(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ensemble> {
     let names = options.names;
-    let wrong = |problem| Error::at(Place::file(path), problem);
+    let wrong = |problem| Error::variant_at(Place::file(path), problem);
     // The mark that Windows puts before a text.
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     match kind(bytes).map_err(wrong)? {
@@ -112,13 +112,13 @@ fn read_as_it_is(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ens
         },
         Kind::Ubjson => match ubjson::read(bytes) {
             Ok(value) => xgboost::from_ubjson(path, &value, options),
-            Err(at) => Err(Error::at(
+            Err(at) => Err(Error::variant_at(
                 Place::byte(path, at),
                 EnsembleProblem::Damaged { kind: "XGBoost UBJSON", what: "not UBJSON from here on".into() },
             )),
         },
         Kind::LightGbm => lightgbm::read(bytes, names).map_err(|refused| {
-            Error::at(refused.line.map_or(Place::file(path), |line| Place::line(path, line)), refused.problem)
+            Error::variant_at(refused.line.map_or(Place::file(path), |line| Place::line(path, line)), refused.problem)
         }),
         Kind::Onnx => onnx::read(bytes, names).map_err(wrong),
     }

@@ -34,7 +34,7 @@ use std::path::Path;
 
 /// Reads XGBoost's JSON.
 pub(super) fn from_json(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ensemble> {
-    let wrong = |problem| Error::at(Place::file(path), problem);
+    let wrong = |problem| Error::variant_at(Place::file(path), problem);
     let text = without_literals(bytes);
     let refused = |error| {
         let peek: Peek = serde_json::from_slice(&text).unwrap_or_default();
@@ -46,7 +46,7 @@ pub(super) fn from_json(path: &Path, bytes: &[u8], options: &Options<'_>) -> Res
 
 /// Reads XGBoost's UBJSON, which holds the same as its JSON.
 pub(super) fn from_ubjson(path: &Path, value: &serde_json::Value, options: &Options<'_>) -> Result<Ensemble> {
-    let wrong = |problem| Error::at(Place::file(path), problem);
+    let wrong = |problem| Error::variant_at(Place::file(path), problem);
     let refused = |error: serde_json::Error| {
         let damaged = || EnsembleProblem::Damaged { kind: "XGBoost UBJSON", what: error.to_string() };
         wrong(Peek::deserialize(value).unwrap_or_default().problem().unwrap_or_else(damaged))
@@ -127,7 +127,7 @@ impl Ensemble {
             serde_json::from_slice(&without_literals(json)).map_err(|error| not_json(path, &error))?;
         document.learner.attributes = write::attributes(&schema.into(), &objects, &super::Provenance::default());
         let options = Options { schemas: &[schema], ..Options::default() };
-        document.into_ensemble(&options, "JSON").map_err(|problem| Error::at(Place::file(path), problem))
+        document.into_ensemble(&options, "JSON").map_err(|problem| Error::variant_at(Place::file(path), problem))
     }
 
     /// Writes the ensemble in XGBoost's JSON model schema, whole or not at all. What is written can be
@@ -138,11 +138,11 @@ impl Ensemble {
     /// `binary:logistic`, or `binary:logitraw` where no probability in f32 stands for the base margin.
     ///
     /// # Errors
-    /// [`Error::Io`] naming `path`; [`EnsembleProblem`] for an ensemble that [`check`](Self::check) refuses, which none
+    /// [`Kind::Io`](crate::error::Kind::Io) naming `path`; [`EnsembleProblem`] for an ensemble that [`check`](Self::check) refuses, which none
     /// that was trained or loaded is.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<()> {
         let path = path.as_ref();
-        self.check().map_err(|problem| Error::at(Place::file(path), problem))?;
+        self.check().map_err(|problem| Error::variant_at(Place::file(path), problem))?;
         let document = Document::new(self);
         output::write_whole(path, |out| {
             serde_json::to_writer(&mut *out, &document)?;
@@ -157,5 +157,5 @@ pub(super) fn not_json(path: &Path, error: &serde_json::Error) -> Error {
         Ok(line) if line > 0 => Place::line(path, line),
         _ => Place::file(path),
     };
-    Error::at(place, EnsembleProblem::NotJson { detail: error.to_string() })
+    Error::variant_at(place, EnsembleProblem::NotJson { detail: error.to_string() })
 }
