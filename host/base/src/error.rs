@@ -71,6 +71,15 @@ pub enum Kind {
     },
     /// The operating system refused to read or write.
     Io,
+    /// Two sources give objects of one name.
+    SameName {
+        /// Source of the first: a file, or `builtin`.
+        first: PathBuf,
+        /// Source of the second.
+        second: PathBuf,
+    },
+    /// Some of several files cannot be read, and the others can.
+    Unread,
     /// The caller cancelled the work through its [`Progress`](crate::progress::Progress).
     Cancelled,
     /// Standard output was closed by its reader (`palpate … | head`): not an error for the user.

@@ -15,10 +15,10 @@ pub(crate) fn descriptor_of(name: &str) -> palpate::Result<Descriptor> {
 pub(crate) fn noise_of(deviation: &str, timer: &str) -> Result<Noise, Failure> {
     let mut noise = Noise::default();
     if !deviation.is_empty() {
-        noise.deviation = deviation.parse().map_err(Error::from)?;
+        noise.deviation = deviation.parse()?;
     }
     if !timer.is_empty() {
-        noise.timer = quantity::duration(timer).map_err(Error::from)?;
+        noise.timer = quantity::duration(timer)?;
     }
     Ok(noise)
 }

@@ -1,7 +1,6 @@
 //! Captures of objects on a table.
 
 use super::*;
-use crate::error::MeshProblem;
 use crate::mesh::Mesh;
 use crate::probe::noise::Noise;
 use crate::touches::{Dataset, Listing, Surroundings, folds};
@@ -219,7 +218,7 @@ fn stated_weights_replace_solid_angles_and_unknown_placements_are_refused_with_t
     assert!(unknown.contains("+q") && unknown.contains(first) && unknown.contains(second), "{unknown}");
     assert!(weighed(&[(first, 0.0)]).unwrap_err().to_string().contains("no placement of brick has a weight above 0"));
     let empty = crate::mesh::placements::placements(&Mesh::default()).unwrap_err();
-    assert_eq!(empty.problem::<MeshProblem>(), Some(&MeshProblem::NoFaces));
+    assert_eq!(empty.what(), "the mesh has no faces");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Origin of the touches that an ensemble was trained on.
 
 use super::{Provenance, Trained};
-use crate::error::{EnsembleProblem, ProbeProblem, Result};
+use crate::error::{EnsembleProblem, Error, Result, problem};
 use crate::probe::approach::Probe;
 use crate::probe::hand;
 use crate::probe::noise::Noise;
@@ -211,9 +211,9 @@ impl StatedProbe {
     /// Compares what two sides state, such as a data set and a model; `names` says who they are.
     ///
     /// # Errors
-    /// [`ProbeProblem::Differs`] if radius, spacing, nominal speed, stroke, scale or scene differ. Tilt and travel are not compared:
-    /// they are how approaches were drawn.
-    pub fn compare(names: [&str; 2], [one, other]: [TrainedProbe; 2]) -> Result<(), ProbeProblem> {
+    /// If radius, spacing, nominal speed, stroke, scale or scene differ. Tilt and travel are not compared: they are how
+    /// approaches were drawn.
+    pub fn compare(names: [&str; 2], [one, other]: [TrainedProbe; 2]) -> Result<()> {
         let differs = |a: f32, b: f32| (a - b).abs() > 1e-5 * a.abs().max(b.abs());
         let mut differences = Vec::new();
         if one.length != other.length {
@@ -242,8 +242,13 @@ impl StatedProbe {
         if differences.is_empty() {
             return Ok(());
         }
-        let [first, second] = names.map(str::to_owned);
-        Err(ProbeProblem::Differs { first, second, differences: differences.join(", ") })
+        Err(Self::differs(names, &differences.join(", ")))
+    }
+
+    /// Two sides state different probes; `names` says who they are, `differences` what each states: "radius 0.15 and 0.3".
+    pub fn differs([first, second]: [&str; 2], differences: &str) -> Error {
+        problem!("{first} and {second} state different probes: {differences}")
+            .fix("Use both with the same probe: with another, times have another meaning.")
     }
 }
 
@@ -257,7 +262,7 @@ impl StatedProbe {
     /// Cost: a pass over touches that no capture made.
     ///
     /// # Errors
-    /// Errors of [`compare`](Self::compare), [`ProbeProblem::OtherStroke`] with both strokes, and
+    /// Errors of [`compare`](Self::compare); recorded touches that show another stroke, with both strokes; and
     /// [`TouchesProblem::TimeTooLong`](crate::error::TouchesProblem::TimeTooLong) for times that are not in seconds.
     pub fn compare_with(names: [&str; 2], probe: Option<TrainedProbe>, longest: u32, dataset: &Dataset) -> Result<()> {
         let own = Self::of(dataset).map(|own| own.trained());
@@ -289,8 +294,7 @@ impl StatedProbe {
         // Touches with a position are of a table, whatever the probe states.
         let is_located = dataset.touches().any(|touch| touch.position().is_some());
         if probe.is_some_and(|probe| probe.cone == 0) && !is_located && !dataset.placement_shares().is_empty() {
-            let [first, second] = names.map(str::to_owned);
-            return Err(ProbeProblem::Differs { first, second, differences: "scene floating and table".into() }.into());
+            return Err(Self::differs(names, "scene floating and table"));
         }
         let stroke = probe.and_then(|probe| probe.stroke);
         let [window, allowed] = match probe.and_then(|probe| stroke_of(&probe)) {
@@ -309,7 +313,7 @@ impl StatedProbe {
         if !is_other {
             return Ok(());
         }
-        let [first, second] = names.map(str::to_owned);
+        let [first, second] = names;
         let seconds = |micros: f64| format!("{:.3} s", micros / 1e6);
         let stroke = match stroke.zip(window).zip(allowed) {
             Some(((stroke, window), allowed)) if is_later => {
@@ -322,7 +326,15 @@ impl StatedProbe {
             Some(((stroke, window), _)) => format!("a stroke of {stroke} ({})", seconds(window)),
             None => "no stroke".into(),
         };
-        Err(ProbeProblem::OtherStroke { first, second, stroke, latest: seconds(latest.micros), is_later }.into())
+        let latest = seconds(latest.micros);
+        let found = match is_later {
+            true => format!("contacts come up to {latest} after the first"),
+            false => format!("no contact is later than {latest} after the first, though many come just before"),
+        };
+        Err(problem!("{first} has {stroke}, and in {second} {found}").fix(
+            "Train for the stroke of the hand that made the touches: state it as stroke in probe.toml, or let `palpate probe \
+             fit` estimate it, from these touches too.",
+        ))
     }
 }
 

@@ -204,9 +204,7 @@ impl<'m> Margins<'m> {
     /// model may know more. Touches of an object with an output for each placement may be of any of them, if they state none.
     ///
     /// # Errors
-    /// [`ProbeProblem::Differs`](crate::error::ProbeProblem::Differs) if model and data set state different probes;
-    /// [`ProbeProblem::OtherStroke`](crate::error::ProbeProblem::OtherStroke) if recorded touches show another stroke than the
-    /// model's;
+    /// If model and data set state different probes, or recorded touches show another stroke than the model's;
     /// [`EvaluateProblem`] if the model does not know an object, works on rows of features instead of touches, or needs a
     /// pose that no touch has.
     pub fn new(candidate: Candidate<'m>, dataset: &Dataset) -> Result<Self> {

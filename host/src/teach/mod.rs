@@ -135,7 +135,7 @@ pub struct TaughtObject {
 /// # Errors
 /// [`TeachProblem`](crate::error::TeachProblem) if the ensemble has leaves of one value or is not over touches, if a name
 /// is known already, if touches are missing or too few, have no pose, or are not every approach;
-/// [`ProbeProblem::Differs`](crate::error::ProbeProblem::Differs) if probes do;
+/// probes that differ;
 /// [`Kind::Setting`](crate::error::Kind::Setting); [`Kind::Cancelled`](crate::error::Kind::Cancelled).
 pub fn teach(
     ensemble: &Ensemble,

@@ -6,7 +6,7 @@ use super::probe::{IN_MILLIMETERS, SizeArguments, refuse_unstated};
 use super::progress::Bar;
 use super::recognize_lines::{Event, each_of};
 use super::scene::SceneArguments;
-use palpate::error::ProbeProblem;
+use palpate::ensemble::StatedProbe;
 use palpate::fit::{Fit, GrazingEstimate, NOT_TOLD, Settings, between, fit, offset, offset_between};
 use palpate::locate::{BareTable, Measured, REACH, bare_table};
 use palpate::output;
@@ -90,9 +90,8 @@ fn run_fit(arguments: &FitArguments, global: &Global) -> Result<()> {
     // The stroke that the recordings state holds where the file states none; one that differs is refused.
     match (there, origin.probe.stroke) {
         (Some(there), Some(given)) if there != given => {
-            let [first, second] = ["the probe file", "the data set"].map(str::to_owned);
             let differences = format!("stroke {given} and {there}");
-            return Err(ProbeProblem::Differs { first, second, differences }.into());
+            return Err(StatedProbe::differs(["the probe file", "the data set"], &differences));
         }
         (_, given) => origin.probe.stroke = given.or(there),
     }

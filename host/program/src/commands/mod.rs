@@ -45,7 +45,7 @@ mod view;
 
 use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use palpate::error::{CaptureProblem, EvaluateProblem, Kind, MeshProblem, Place};
+use palpate::error::{CaptureProblem, EvaluateProblem, Kind, Place};
 use palpate::touches::{Dataset, Listing, Log, Warning};
 use palpate::{Error, Result, output};
 use std::path::{Path, PathBuf};
@@ -255,9 +255,9 @@ fn has_option(command: &str, option: &str) -> bool {
 /// Addition to an error with which `command` ends: its options that help.
 fn hint(error: &Error, command: &str) -> Option<String> {
     let has = |option: &str| has_option(command, option);
-    let said = match error.problem() {
-        Some(MeshProblem::Unread { .. }) if has("skip-bad") => "--skip-bad continues without what cannot be read.",
-        Some(MeshProblem::SameName { first, second, .. })
+    let said = match error.kind() {
+        Kind::Unread if has("skip-bad") => "--skip-bad continues without what cannot be read.",
+        Kind::SameName { first, second }
             if has("instances") && first.parent() != second.parent() && first.file_stem() == second.file_stem() =>
         {
             "--instances takes each directory as one object, called like the directory."

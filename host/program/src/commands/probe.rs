@@ -1,10 +1,11 @@
 //! Options for the probe and the sizes of objects.
 
 use super::progress::Bar;
+use super::real::only_captured;
 use super::remark;
 use palpate::capture;
 use palpate::ensemble::StatedProbe;
-use palpate::error::{CaptureProblem, ProbeProblem};
+use palpate::error::CaptureProblem;
 use palpate::mesh::facts::sides;
 use palpate::mesh::source::{self, Search};
 use palpate::mesh::{BACKGROUND, Object, builtin};
@@ -93,13 +94,11 @@ impl ProbeArguments {
         match asked {
             None if there.is_none() => Ok(usual),
             Some(real) if there.is_none() && real.grazing.is_none() => Ok(real),
-            Some(_) if there.is_none() => Err(self.named(ProbeProblem::OnlyCaptured.into())),
-            Some(real) if real != there => Err(ProbeProblem::Differs {
-                first: self.path().map_or_else(String::new, |path| path.display().to_string()),
-                second: "the data set".into(),
-                differences: format!("[real]: {real}; and {there}"),
+            Some(_) if there.is_none() => Err(self.named(only_captured())),
+            Some(real) if real != there => {
+                let name = self.path().map_or_else(String::new, |path| path.display().to_string());
+                Err(StatedProbe::differs([&name, "the data set"], &format!("[real]: {real}; and {there}")))
             }
-            .into()),
             _ => Ok(Noise::default()),
         }
     }
@@ -177,9 +176,8 @@ impl UnitArguments {
         objects.sort_by(|a, b| a.name.cmp(&b.name));
         match objects.windows(2).find(|pair| pair[0].name == pair[1].name) {
             Some(pair) => {
-                let name = pair[0].name.clone();
-                let (first, second) = ("builtin".into(), name.clone().into());
-                Err(palpate::error::MeshProblem::SameName { name, first, second }.into())
+                let name = &pair[0].name;
+                Err(source::same_name(name, ["builtin".into(), name.into()]))
             }
             None => Ok(objects),
         }
@@ -300,7 +298,7 @@ impl SizeArguments {
         let Some(file) = self.probe.read()? else { return Ok(Origin { unit, ..base }) };
         let problem = |message: &str| {
             let path = self.probe.path().cloned().unwrap_or_default();
-            Err(Error::from(ProbeProblem::BadFile { message: message.into() }).in_file(path))
+            Err(ProbeFile::unusable(message).in_file(path))
         };
         match (unit, file.unit) {
             (Length::Tenth, Length::Millimeter) => {

@@ -1,9 +1,9 @@
 //! The option for what a real sensor, timer and robot add to touches.
 
 use super::keys::nearest;
-use palpate::error::{Place, ProbeProblem};
+use palpate::error::{Kind, Place, problem};
 use palpate::probe::file::ProbeFile;
-use palpate::probe::noise::{BadNoise, Noise, PartialNoise};
+use palpate::probe::noise::{Noise, PartialNoise};
 use palpate::{Error, Result};
 use std::path::{Path, PathBuf};
 
@@ -44,7 +44,7 @@ impl RealArguments {
     /// Noise of approaches on a table, where objects may move.
     ///
     /// # Errors
-    /// If its probe file cannot be read; [`ProbeProblem::OnlyCaptured`] for fingers that bend aside.
+    /// If its probe file cannot be read; for fingers that bend aside.
     pub(crate) fn on_table(&self, base: Noise) -> Result<Noise> {
         let noise = match self.real.as_ref().map(|real| &real.given) {
             None => base,
@@ -53,8 +53,8 @@ impl RealArguments {
         };
         match self.real.as_ref().map(|real| &real.given) {
             _ if noise.grazing.is_none() => Ok(noise),
-            Some(Given::File(path)) => Err(Error::variant_at(Place::file(path), ProbeProblem::OnlyCaptured)),
-            _ => Err(ProbeProblem::OnlyCaptured.into()),
+            Some(Given::File(path)) => Err(only_captured().at(Place::file(path))),
+            _ => Err(only_captured()),
         }
     }
 
@@ -81,10 +81,20 @@ fn real(text: &str) -> Result<Real, String> {
 }
 
 /// A problem with the settings, with the key that may have been meant.
-fn wrong(problem: BadNoise) -> String {
-    let key = problem.value.split('=').next().unwrap_or_default();
-    let nearest = if problem.key == "real" { nearest(key, &PartialNoise::KEYS) } else { String::new() };
-    format!("{problem}{nearest}")
+fn wrong(error: Error) -> String {
+    let nearest = match error.kind() {
+        Kind::Setting { name: "real", value, .. } => {
+            nearest(value.split('=').next().unwrap_or_default(), &PartialNoise::KEYS)
+        }
+        _ => String::new(),
+    };
+    format!("{error}{nearest}")
+}
+
+/// Fingers that bend aside were to be added to touches that are captured already.
+pub(super) fn only_captured() -> Error {
+    problem!("grazing is added to touches while they are captured: a data set does not hold the angles of contacts")
+        .fix("Capture with `palpate capture --probe FILE`, or leave grazing out of the file.")
 }
 
 #[cfg(test)]

@@ -38,7 +38,6 @@ pub mod builtin;
 #[path = "no_builtin.rs"]
 mod builtin;
 mod collada;
-mod error;
 mod exact;
 pub mod facts;
 pub mod file;
@@ -56,8 +55,8 @@ mod unread;
 mod weld;
 mod words;
 
-pub use error::MeshProblem;
 pub use triangles::Mesh;
+pub(crate) use triangles::no_extent;
 
 /// The name of the object of many different shapes, and of a model's background column.
 pub const BACKGROUND: &str = "background";

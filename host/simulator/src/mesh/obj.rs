@@ -3,11 +3,12 @@
 //! `tobj` parses and indexes. In front of it, `FacesOnly` lets through only vertices and faces, and checks them: so an
 //! error names its line, and what does not shape the surface (normals, materials, groups, lines) cannot break a mesh.
 
-use crate::error::{Error, MeshProblem, Place, Result};
+use crate::error::{Error, Place, Result, problem};
 use crate::mesh::Mesh;
 use crate::mesh::exact::{Bounds, Moved, rounded, step_of_decimals};
 use crate::mesh::polygon::Cutter;
-use crate::mesh::words::{coordinate, number, shown};
+use crate::mesh::triangles::WITH_FACES;
+use crate::mesh::words::{CORRECT, coordinate, missing, number, shown};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
@@ -22,9 +23,9 @@ pub(super) const KEYWORDS: [&[u8]; 11] =
 /// [`file::read`](super::file::read) says so.
 ///
 /// # Errors
-/// [`Kind::Io`](crate::error::Kind::Io) when the file cannot be read; a [`MeshProblem`] with its line when a vertex is not three finite numbers
-/// or a face's index is not a whole number or out of range, and with the file when there is no face or each is a single
-/// point.
+/// [`Kind::Io`](crate::error::Kind::Io) when the file cannot be read; with its line when a vertex is not three finite
+/// numbers or a face's index is not a whole number or out of range, and with the file when there is no face or each is a
+/// single point.
 pub fn read(path: &Path) -> Result<Mesh> {
     let file = File::open(path).map_err(|source| Error::io(path, "read the mesh", source))?;
     parse(BufReader::with_capacity(1 << 18, file), path)
@@ -37,10 +38,12 @@ pub fn read(path: &Path) -> Result<Mesh> {
 /// # Errors
 /// Errors of [`read`].
 pub fn parse(text: impl BufRead, path: &Path) -> Result<Mesh> {
-    parse_moved(text, path).map(|(mesh, ..)| mesh)
+    let (mesh, ..) = parse_moved(text, path)?;
+    mesh.usable().map_err(|error| error.at(Place::file(path)))
 }
 
-/// Parses a mesh, and returns the offset subtracted from its coordinates and the step in which they are rounded.
+/// Parses a mesh, which may have no face, and returns the offset subtracted from its coordinates and the step in which
+/// they are rounded.
 pub(super) fn parse_moved(text: impl BufRead, path: &Path) -> Result<Moved> {
     let mut filter = FacesOnly::new(text, path);
     let loaded = tobj::load_obj_buf(&mut filter, &tobj::LoadOptions::default(), |_| Ok(Default::default()));
@@ -48,8 +51,8 @@ pub(super) fn parse_moved(text: impl BufRead, path: &Path) -> Result<Moved> {
         return Err(error);
     }
     filter.check_indices()?;
-    let unusable = |problem| Error::variant_at(Place::file(path), problem);
-    let (models, _) = loaded.map_err(|error| unusable(MeshProblem::Unreadable { reason: error.to_string() }))?;
+    let (models, _) = loaded
+        .map_err(|reason| problem!("cannot be read as a mesh ({reason})").fix(WITH_FACES).at(Place::file(path)))?;
     let vertices: Vec<[f64; 3]> = models.iter().flat_map(|model| model.mesh.positions.as_chunks().0).copied().collect();
     let offset = Bounds::of(vertices.iter().copied()).offset();
     let mut mesh = Mesh::default();
@@ -57,7 +60,7 @@ pub(super) fn parse_moved(text: impl BufRead, path: &Path) -> Result<Moved> {
         append(&mut mesh, model.mesh, offset);
     }
     let step = step_of_decimals(&vertices, &mesh.triangles);
-    Ok((mesh.usable().map_err(unusable)?, offset, step))
+    Ok((mesh, offset, step))
 }
 
 fn append(mesh: &mut Mesh, part: tobj::Mesh, offset: [f64; 3]) {
@@ -122,8 +125,8 @@ impl<'a, R: BufRead> FacesOnly<'a, R> {
         if index <= self.vertices {
             return Ok(());
         }
-        let problem = MeshProblem::IndexAfterLast { index, vertices: self.vertices };
-        Err(Error::variant_at(Place::line(self.path, line), problem))
+        let problem = problem!("vertex {index} of a face is out of range: the file has {} vertices", self.vertices);
+        Err(problem.fix(CORRECT).at(Place::line(self.path, line)))
     }
 
     /// Reads the next line, with the lines that a backslash joins to it; false at the end of the text.
@@ -144,7 +147,7 @@ impl<'a, R: BufRead> FacesOnly<'a, R> {
     }
 
     /// Appends the line to the clean ones if it is a vertex or a face.
-    fn clean_line(&mut self) -> Result<(), MeshProblem> {
+    fn clean_line(&mut self) -> Result<()> {
         let Self { raw, clean, .. } = self;
         let line = raw.split(|&byte| byte == b'#').next().unwrap_or_default();
         let line = without_mark(line);
@@ -153,7 +156,7 @@ impl<'a, R: BufRead> FacesOnly<'a, R> {
             Some(b"v") => {
                 clean.push(b'v');
                 for axis in ['x', 'y', 'z'] {
-                    let word = words.next().ok_or(MeshProblem::MissingCoordinate { axis })?;
+                    let word = words.next().ok_or_else(|| missing(axis))?;
                     coordinate(word, axis)?;
                     clean.push(b' ');
                     clean.extend_from_slice(word);
@@ -167,10 +170,14 @@ impl<'a, R: BufRead> FacesOnly<'a, R> {
                 let mut corners = 0;
                 for word in words {
                     let index = word.split(|&byte| byte == b'/').next().and_then(number::<i64>);
-                    let index = index.ok_or_else(|| MeshProblem::NotAnIndex { text: shown(word) })?;
+                    let not_index = || problem!("{:?} is not a vertex of a face", shown(word)).fix(CORRECT);
+                    let index = index.ok_or_else(not_index)?;
                     let absolute = if index < 0 { index.saturating_add_unsigned(self.vertices) + 1 } else { index };
                     let absolute = u64::try_from(absolute).ok().filter(|&absolute| absolute > 0);
-                    let absolute = absolute.ok_or(MeshProblem::IndexBeforeFirst { index, vertices: self.vertices })?;
+                    let absolute = absolute.ok_or_else(|| {
+                        let before = format!("{} vertices before it", self.vertices);
+                        problem!("vertex {index} of a face is out of range: {before}").fix(CORRECT)
+                    })?;
                     if absolute > self.largest.0 {
                         self.largest = (absolute, self.line);
                     }
@@ -193,7 +200,7 @@ impl<'a, R: BufRead> FacesOnly<'a, R> {
         self.clean.clear();
         self.taken = 0;
         while self.clean.len() < PORTION && self.next_line()? {
-            self.clean_line().map_err(|problem| Error::variant_at(Place::line(self.path, self.line), problem))?;
+            self.clean_line().map_err(|error| error.at(Place::line(self.path, self.line)))?;
         }
         Ok(())
     }

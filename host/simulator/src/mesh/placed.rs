@@ -2,7 +2,9 @@
 
 use super::Mesh;
 use super::exact::{Moved, step_of_decimals, step_of_f32};
-use crate::error::MeshProblem;
+use super::triangles::too_many_vertices;
+use super::words::not_finite;
+use crate::error::{Error, Result, problem};
 use glam::{DAffine3, DVec3};
 
 /// The mesh of a scene, grown instance by instance, never beyond a bound that the length of the file sets: a file of a few
@@ -25,10 +27,10 @@ impl Placed {
     }
 
     /// Refuses a mesh if its vertices or triangles would make the scene too large.
-    pub(super) fn check(&self, vertices: usize, triangles: usize) -> Result<(), MeshProblem> {
+    pub(super) fn check(&self, vertices: usize, triangles: usize) -> Result<()> {
         let sum = |own: usize, more: usize| own as u64 + more as u64;
         let bytes = 24 * sum(self.vertices.len(), vertices) + 12 * sum(self.triangles.len(), triangles);
-        if bytes > self.limit { Err(MeshProblem::TooLarge { limit: self.limit }) } else { Ok(()) }
+        if bytes > self.limit { Err(too_large(self.limit)) } else { Ok(()) }
     }
 
     /// Appends a mesh, placed by `transform`: `vertices`, and triangles among them. A transform that mirrors turns the
@@ -41,17 +43,17 @@ impl Placed {
         vertices: impl ExactSizeIterator<Item = DVec3>,
         triangles: &[[u32; 3]],
         transform: &DAffine3,
-    ) -> Result<(), MeshProblem> {
+    ) -> Result<()> {
         self.check(vertices.len(), triangles.len())?;
         let Self { vertices: own, triangles: all, .. } = self;
-        let base = u32::try_from(own.len()).map_err(|_| MeshProblem::TooManyVertices)?;
-        u32::try_from(own.len() + vertices.len()).map_err(|_| MeshProblem::TooManyVertices)?;
+        let base = u32::try_from(own.len()).map_err(|_| too_many_vertices())?;
+        u32::try_from(own.len() + vertices.len()).map_err(|_| too_many_vertices())?;
         for vertex in vertices {
             // As it stands where nothing moves it, every bit.
             let place = if *transform == DAffine3::IDENTITY { vertex } else { transform.transform_point3(vertex) };
             for (axis, value) in ['x', 'y', 'z'].into_iter().zip(place.as_vec3().to_array()) {
                 if !value.is_finite() {
-                    return Err(MeshProblem::NotFinite { axis, text: value.to_string() });
+                    return Err(not_finite(axis, value.to_string()));
                 }
             }
             own.push(place.to_array());
@@ -69,12 +71,15 @@ impl Placed {
     }
 
     /// The mesh of the whole scene.
-    ///
-    /// # Errors
-    /// Errors of [`Mesh::usable`].
-    pub(super) fn into_mesh(self) -> Result<Moved, MeshProblem> {
+    pub(super) fn into_mesh(self) -> Moved {
         let step = self.step.max(step_of_decimals(&self.vertices, &self.triangles));
         let (mesh, moved) = Mesh::from_f64(&self.vertices, self.triangles);
-        Ok((mesh.usable()?, moved, step))
+        (mesh, moved, step)
     }
+}
+
+/// A mesh, placed as often as its file says, is too large for a file of its length; or a pipe does not end.
+pub(super) fn too_large(limit: u64) -> Error {
+    problem!("the mesh would take more than {limit} bytes")
+        .fix("Simplify the mesh, or export it without instances or in parts.")
 }

@@ -1,7 +1,7 @@
 //! The triangle mesh itself.
 
 use super::weld::Places;
-use crate::error::MeshProblem;
+use crate::error::{Error, Result, problem};
 use glam::Vec3;
 
 /// An indexed triangle mesh, in its file's own units.
@@ -11,6 +11,19 @@ pub struct Mesh {
     pub vertices: Vec<[f32; 3]>,
     /// Triangles as indices into `vertices`, anticlockwise when seen from outside.
     pub triangles: Vec<[u32; 3]>,
+}
+
+/// The remedy for a file without a surface.
+pub(super) const WITH_FACES: &str = "Export the mesh as a file with faces: OBJ, STL, PLY, GLB or COLLADA.";
+
+/// Each triangle of a mesh is a single point.
+pub(crate) fn no_extent() -> Error {
+    problem!("the mesh has no extent: each of its faces is a single point").fix(WITH_FACES)
+}
+
+/// A mesh has more vertices than an index can tell apart.
+pub(super) fn too_many_vertices() -> Error {
+    problem!("the mesh has more than 4294967295 vertices").fix("Simplify the mesh, or export it in parts.")
 }
 
 impl Mesh {
@@ -51,15 +64,33 @@ impl Mesh {
     /// touched where they float, and would stretch the bounding box.
     ///
     /// # Errors
-    /// [`MeshProblem::NoFaces`] without triangles, [`MeshProblem::NoExtent`] if none is left.
-    pub(super) fn usable(mut self) -> Result<Self, MeshProblem> {
-        if self.triangles.is_empty() {
-            return Err(MeshProblem::NoFaces);
-        }
+    /// Without triangles, and if none is left.
+    pub(super) fn usable(mut self) -> Result<Self> {
+        self.check_faces()?;
         let Self { vertices, triangles } = &mut self;
         let vertex = |index: u32| vertices[index as usize];
         triangles.retain(|&[a, b, c]| vertex(a) != vertex(b) || vertex(b) != vertex(c));
-        if triangles.is_empty() { Err(MeshProblem::NoExtent) } else { Ok(self) }
+        if triangles.is_empty() { Err(no_extent()) } else { Ok(self) }
+    }
+
+    /// Refuses a mesh without triangles.
+    pub(crate) fn check_faces(&self) -> Result<()> {
+        if self.triangles.is_empty() { Err(problem!("the mesh has no faces").fix(WITH_FACES)) } else { Ok(()) }
+    }
+
+    /// The place of the vertex of this index, which a triangle names.
+    ///
+    /// # Errors
+    /// If the vertex is missing or not finite.
+    pub(crate) fn vertex(&self, index: u32) -> Result<Vec3> {
+        const FINITE: &str = "Give a mesh whose faces have finite vertices.";
+        let vertex = self.vertices.get(index as usize).map(|vertex| Vec3::from(*vertex));
+        let vertex = vertex.ok_or_else(|| {
+            let vertices = self.vertices.len();
+            problem!("vertex {index} of the mesh is missing: it has {vertices} vertices, counted from 0").fix(FINITE)
+        })?;
+        let not_finite = || problem!("vertex {index} of the mesh is not finite").fix(FINITE);
+        vertex.is_finite().then_some(vertex).ok_or_else(not_finite)
     }
 
     /// A globe with hills, for tests and benchmarks that need a mesh of a certain size: closed, right side out, about 2

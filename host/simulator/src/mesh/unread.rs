@@ -1,7 +1,8 @@
 //! Files that are not read although they may hold a mesh, and what reads them.
 
-use crate::error::MeshProblem;
+use crate::error::{Error, problem};
 use palpate_base::gone;
+use std::fmt::Display;
 use std::path::Path;
 
 /// A format that is not read.
@@ -98,9 +99,25 @@ fn points(path: &Path) -> Option<(&'static str, &'static str)> {
     Some((what, gone::instead(word)?))
 }
 
-/// The problem of a PLY file without faces.
-pub(super) fn cloud() -> MeshProblem {
-    MeshProblem::Points { what: "points in PLY", instead: gone::instead("points").unwrap_or_default() }
+/// A PLY file has no faces.
+pub(super) fn cloud() -> Error {
+    no_points("points in PLY", gone::instead("points").unwrap_or_default())
+}
+
+/// A file holds points or depth images. `instead` is the rest of a sentence that begins with "Instead".
+fn no_points(what: &str, instead: &str) -> Error {
+    problem!("{what} are not read").fix(format!("Instead, {instead}."))
+}
+
+/// A file uses a feature that is not read and would change the surface, or is of a format that is not read. `instead` is a
+/// sentence without its full stop.
+pub(super) fn unsupported(what: impl Display, instead: &str) -> Error {
+    problem!("{what} is not read").fix(format!("{instead}."))
+}
+
+/// Git LFS left a pointer in the place of a file.
+pub(super) fn pointer() -> Error {
+    problem!("this is a pointer of Git LFS, and not the file itself").fix("Fetch it: git lfs pull.")
 }
 
 fn by_extension(path: &Path) -> Option<&'static Unread> {
@@ -120,20 +137,19 @@ pub(super) fn is_pointer(head: &[u8]) -> bool {
 
 /// Problem of a file that starts with `head` and is of a format that is not read, by its content or else by its name; none if
 /// it may be read.
-pub(super) fn problem(head: &[u8], path: &Path) -> Option<MeshProblem> {
+pub(super) fn problem(head: &[u8], path: &Path) -> Option<Error> {
     if is_pointer(head) {
-        return Some(MeshProblem::LfsPointer);
+        return Some(pointer());
     }
     if let Some((what, instead)) = points(path) {
-        return Some(MeshProblem::Points { what, instead });
+        return Some(no_points(what, instead));
     }
     let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
     let begins = |begin: &&[u8]| text.get(..begin.len()).is_some_and(|start| start.eq_ignore_ascii_case(begin));
-    let unsupported = |what: &str, instead| Some(MeshProblem::Unsupported { what: what.into(), instead });
     let by_content = FORMATS.iter().find(|format| format.begins.iter().any(begins));
     if let Some(format) = by_content.or_else(|| by_extension(path)) {
-        return unsupported(format.name, format.instead);
+        return Some(unsupported(format.name, format.instead));
     }
     let (_, what, instead) = OTHERS.iter().find(|(begin, ..)| begins(begin))?;
-    unsupported(what, *instead)
+    Some(unsupported(what, instead))
 }

@@ -28,7 +28,7 @@
 //! Radius, spacing, speed, stroke and unit are what a data set and a model state and what is compared. What the real probe adds
 //! is not compared: it is added to touches by a capture with this file or else in training and testing, and never twice.
 
-use crate::error::{Error, Place, ProbeProblem, Result, Variant};
+use crate::error::{Error, Place, Result, problem};
 use crate::probe::approach::{FINGERS, Probe};
 use crate::probe::noise::{Deviation, Grazing, Noise, quantity};
 use palpate_shared::format::Length;
@@ -104,9 +104,8 @@ impl ProbeFile {
     /// Reads a probe file.
     ///
     /// # Errors
-    /// If it cannot be read; with file and line [`ProbeProblem::BadFile`] if it is not TOML, lacks a measure or has what
-    /// a probe does not; with the file [`Kind::Setting`](crate::error::Kind::Setting) if a number is out of its
-    /// range.
+    /// If it cannot be read; with file and line if it is not TOML, lacks a measure or has what a probe does not; with the
+    /// file [`Kind::Setting`](crate::error::Kind::Setting) if a number is out of its range.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, "read the probe", error))?;
@@ -120,12 +119,11 @@ impl ProbeFile {
     pub fn parse(text: &str, path: &Path) -> Result<Self> {
         let document: Document = toml::from_str(text).map_err(|error| {
             let before = error.span().and_then(|span| text.get(..span.start));
-            let message = error.message().to_owned();
             let place = match before {
                 Some(before) => Place::line(path, 1 + before.matches('\n').count() as u64),
                 None => Place::file(path),
             };
-            Error::variant_at(place, ProbeProblem::BadFile { message })
+            Self::unusable(error.message()).at(place)
         })?;
         let file = Self::of(&document);
         let length = match file.unit {
@@ -134,6 +132,13 @@ impl ProbeFile {
         };
         let checked = file.probe.check(length).and_then(|()| file.real.check());
         checked.map(|()| file).map_err(|error| error.in_file(path))
+    }
+
+    /// A probe file cannot be used.
+    pub fn unusable(message: &str) -> Error {
+        problem!("not a usable probe file: {message}").fix(
+            "Give unit (\"unit\" or \"mm\"), radius, spacing, speed, and optionally tilt, stroke, travel, timer and [real].",
+        )
     }
 
     fn of(document: &Document) -> Self {
@@ -170,10 +175,10 @@ fn tilt() -> f64 {
 /// A quantity that is written as text with its unit.
 fn read<'de, D: Deserializer<'de>, T>(
     deserializer: D,
-    parse: impl Fn(&str) -> Result<T, ProbeProblem>,
+    parse: impl Fn(&str) -> Result<T>,
 ) -> Result<Option<T>, D::Error> {
     let text = String::deserialize(deserializer)?;
-    parse(&text).map(Some).map_err(|problem| D::Error::custom(format!("{problem}. {}", problem.fix())))
+    parse(&text).map(Some).map_err(D::Error::custom)
 }
 
 fn duration<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
@@ -205,7 +210,7 @@ fn shares<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f64; FINGERS], 
     };
     let mut shares = [0.0; FINGERS];
     for (share, text) in shares.iter_mut().zip(texts) {
-        *share = quantity::share(&text).map_err(|problem| D::Error::custom(format!("{problem}. {}", problem.fix())))?;
+        *share = quantity::share(&text).map_err(D::Error::custom)?;
     }
     Ok(shares)
 }

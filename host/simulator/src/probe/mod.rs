@@ -37,7 +37,6 @@
 //! ```
 
 pub mod approach;
-mod error;
 pub mod file;
 pub mod hand;
 mod located;
@@ -47,7 +46,6 @@ pub mod sweep;
 pub mod unit;
 
 pub use approach::{Aim, Approach, Probe};
-pub use error::ProbeProblem;
 pub use located::Located;
 pub use scene::{Scene, Table};
 

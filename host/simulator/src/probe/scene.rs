@@ -1,9 +1,9 @@
 //! A mesh in the units of the probe, ready to be touched.
 
-use crate::error::{MeshProblem, Result};
-use crate::mesh::Mesh;
+use crate::error::Result;
+use crate::mesh::{Mesh, no_extent};
 use crate::probe::sweep::{Contact, Surface, narrow::Triangle};
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DMat3, DVec3};
 
 /// A mesh in the units of the probe, with what makes casting spheres at it fast.
 #[derive(Clone, Debug)]
@@ -30,8 +30,8 @@ impl Scene {
     /// The mesh, scaled so that its bounding box's longest side has `length` units and centered on the box's center.
     ///
     /// # Errors
-    /// A [`MeshProblem`] when the mesh has no triangles, a triangle names a vertex that is missing or not finite, or all
-    /// vertices are at the same point.
+    /// When the mesh has no triangles, a triangle names a vertex that is missing or not finite, or all vertices are at the
+    /// same point.
     pub fn new(mesh: &Mesh, length: f64) -> Result<Self> {
         let mut triangles = corners(mesh)?;
         scale(&mut triangles, length)?;
@@ -56,7 +56,7 @@ impl Scene {
     /// The mesh in its own units and place.
     ///
     /// # Errors
-    /// A [`MeshProblem`] when the mesh has no triangles, or a triangle names a vertex that is missing or not finite.
+    /// When the mesh has no triangles, or a triangle names a vertex that is missing or not finite.
     pub fn as_is(mesh: &Mesh) -> Result<Self> {
         Ok(Self::of(corners(mesh)?))
     }
@@ -137,16 +137,9 @@ impl Scene {
     }
 }
 
-fn corners(mesh: &Mesh) -> Result<Vec<Triangle>, MeshProblem> {
-    let corner = |index: u32| {
-        let vertices = mesh.vertices.len();
-        let vertex = mesh.vertices.get(index as usize).ok_or(MeshProblem::MissingVertex { index, vertices })?;
-        let vertex = Vec3::from(*vertex);
-        if vertex.is_finite() { Ok(vertex.as_dvec3()) } else { Err(MeshProblem::VertexNotFinite { index }) }
-    };
-    if mesh.triangles.is_empty() {
-        return Err(MeshProblem::NoFaces);
-    }
+fn corners(mesh: &Mesh) -> Result<Vec<Triangle>> {
+    mesh.check_faces()?;
+    let corner = |index: u32| mesh.vertex(index).map(|vertex| vertex.as_dvec3());
     let mut triangles = Vec::with_capacity(mesh.triangles.len());
     for &[a, b, c] in &mesh.triangles {
         triangles.push([corner(a)?, corner(b)?, corner(c)?]);
@@ -155,11 +148,11 @@ fn corners(mesh: &Mesh) -> Result<Vec<Triangle>, MeshProblem> {
 }
 
 /// Scales triangles so that the longest side of their bounding box has `length` units, and moves its center to the origin.
-fn scale(triangles: &mut [Triangle], length: f64) -> Result<(), MeshProblem> {
+fn scale(triangles: &mut [Triangle], length: f64) -> Result<()> {
     let [low, high] = bounds(triangles);
     let longest = (high - low).max_element();
     if longest <= 0.0 {
-        return Err(MeshProblem::NoExtent);
+        return Err(no_extent());
     }
     let (center, scale) = ((low + high) / 2.0, length / longest);
     triangles.iter_mut().flatten().for_each(|corner| *corner = (*corner - center) * scale);

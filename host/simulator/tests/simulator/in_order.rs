@@ -1,4 +1,4 @@
-use palpate_simulator::error::{Error, MeshProblem, Result};
+use palpate_simulator::error::{Result, problem};
 use palpate_simulator::in_order::in_order;
 use rayon::prelude::*;
 
@@ -14,11 +14,10 @@ fn the_first_failure_in_order_is_returned_although_a_later_one_comes_sooner() {
             7 => _ = later_failed.wait(),
             _ => return Ok(number),
         }
-        Err(Error::from(MeshProblem::NotMeshed { name: number.to_string(), seed: None }))
+        Err(problem!("number {number} failed"))
     };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(8).build().unwrap();
     let failed = pool.install(|| in_order((0..8).into_par_iter().with_max_len(1).map(one))).unwrap_err();
-    let first = Error::from(MeshProblem::NotMeshed { name: "1".into(), seed: None });
-    assert_eq!(failed.to_string(), first.to_string());
+    assert_eq!(failed.to_string(), "number 1 failed");
     assert_eq!(in_order([Ok(2), Ok(3)].into_par_iter()).unwrap(), [2, 3]);
 }

@@ -231,8 +231,7 @@ fn origin(dataset: &Dataset, settings: &Settings, evidence: &Evidence<'_>) -> Pr
 /// objects that the ensemble does not know, and is called [`BACKGROUND`].
 ///
 /// # Errors
-/// Errors of [`train`]; [`ProbeProblem::Differs`](crate::error::ProbeProblem::Differs) if the data sets were captured with
-/// different probes; [`TrainProblem::Background`] if only one of them holds approaches, or an object has the
+/// Errors of [`train`]; data sets that were captured with different probes; [`TrainProblem::Background`] if only one of them holds approaches, or an object has the
 /// background's name.
 pub fn train_with_background(
     dataset: &Dataset,

@@ -28,7 +28,7 @@ mod spoon;
 mod winebottle;
 mod wristwatch;
 
-use crate::error::{Error, MeshProblem, Result};
+use crate::error::{Error, Result, problem};
 use crate::in_order::in_order;
 use crate::mesh::{BACKGROUND, Instance, Object};
 use contour::Form;
@@ -65,7 +65,7 @@ pub fn names() -> [&'static str; 10] {
 /// The meshes are the same on any number of threads. Takes a few seconds of one thread's time.
 ///
 /// # Errors
-/// [`MeshProblem::NotMeshed`], never so far.
+/// If one has no closed mesh, never so far.
 pub fn all() -> Result<Vec<Object>> {
     make_all(&KINDS, None)
 }
@@ -82,8 +82,8 @@ pub fn one(name: &str) -> Result<Object> {
 /// same seed gives the same object. It has the kind's name.
 ///
 /// # Errors
-/// [`Kind::Setting`](crate::error::Kind::Setting) if there is no such kind; [`MeshProblem::NotMeshed`] if the
-/// proportions that the seed gives have no closed mesh.
+/// [`Kind::Setting`](crate::error::Kind::Setting) if there is no such kind; and if the proportions that the seed gives
+/// have no closed mesh.
 pub fn varied(name: &str, seed: u64) -> Result<Object> {
     make_one(&kind(name)?, Some(seed))
 }
@@ -102,7 +102,7 @@ pub fn instances(name: &str, count: usize, seed: u64) -> Result<Object> {
         Ok(Instance { name: format!("varied-{seed}"), mesh: make_one(&kind, Some(seed))?.mesh().clone() })
     };
     let made = in_order((0..count.max(1) as u64).into_par_iter().map(make))?;
-    let object = Object::of_instances(name, made).ok_or(MeshProblem::NoMeshes)?;
+    let object = Object::of_instances(name, made).ok_or_else(|| not_meshed(name, Some(seed)))?;
     Ok(Object { millimeters: Some(MILLIMETERS), ..object })
 }
 
@@ -117,11 +117,11 @@ pub const BACKGROUND_SHAPES: usize = 200;
 /// Takes about a tenth of a second of one thread's time per shape.
 ///
 /// # Errors
-/// [`MeshProblem::NotMeshed`] if none of many shapes in a row has a closed mesh, never so far.
+/// If none of many shapes in a row has a closed mesh, never so far.
 pub fn background(count: usize, seed: u64) -> Result<Object> {
     let first = seed.wrapping_mul(1_000_000_007);
     let made = in_order((0..count.max(1) as u64).into_par_iter().map(|number| shape(first, number)))?;
-    let object = Object::of_instances(BACKGROUND, made).ok_or(MeshProblem::NoMeshes)?;
+    let object = Object::of_instances(BACKGROUND, made).ok_or_else(|| not_meshed(BACKGROUND, Some(seed)))?;
     Ok(Object { millimeters: Some(MILLIMETERS), ..object })
 }
 
@@ -133,7 +133,7 @@ fn shape(first: u64, number: u64) -> Result<Instance> {
     let mut made = seeds.filter_map(|seed| Some((seed, contour::mesh(&background::form(seed))?)));
     match made.next() {
         Some((_, mesh)) => Ok(Instance { name: format!("shape-{number}"), mesh }),
-        None => Err(MeshProblem::NotMeshed { name: format!("shape-{number}"), seed: Some(first) }.into()),
+        None => Err(not_meshed(&format!("shape-{number}"), Some(first))),
     }
 }
 
@@ -159,7 +159,7 @@ pub fn many(count: usize) -> Result<Vec<Object>> {
                 let seeds = (0..100_u64).map(|attempt| 2_000 + instance as u64 + 1_000 * attempt);
                 let made = seeds.map(|seed| make_one(&KINDS[kind], Some(seed))).find(Result::is_ok);
                 let name = format!("{}-{instance}", KINDS[kind].0);
-                let object = made.ok_or_else(|| MeshProblem::NotMeshed { name: name.clone(), seed: None })??;
+                let object = made.ok_or_else(|| not_meshed(&name, None))??;
                 Ok(Object { millimeters: Some(MILLIMETERS), ..Object::new(name, object.mesh().clone()) })
             }
             (_, false) => {
@@ -188,8 +188,17 @@ fn make_one(&(name, form): &Kind, seed: Option<u64>) -> Result<Object> {
     let mut proportions = seed.map_or(Proportions::canonical(), Proportions::varied);
     match contour::mesh(&form(&mut proportions)) {
         Some(mesh) => Ok(Object { millimeters: Some(MILLIMETERS), ..Object::new(name, mesh) }),
-        None => Err(MeshProblem::NotMeshed { name: name.into(), seed }.into()),
+        None => Err(not_meshed(name, seed)),
     }
+}
+
+/// An object cannot be meshed without gaps at any resolution that is tried. The seed is that of its proportions.
+fn not_meshed(name: &str, seed: Option<u64>) -> Error {
+    let (which, fix) = match seed {
+        Some(seed) => (format!("with seed {seed}"), "Use another seed."),
+        None => ("in its canonical proportions".into(), "Report this as a bug."),
+    };
+    problem!("the built-in object {name} {which} has no closed mesh").fix(fix)
 }
 
 fn kind(name: &str) -> Result<Kind> {

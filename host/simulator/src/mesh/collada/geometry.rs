@@ -2,9 +2,10 @@
 
 use super::numbers::numbers;
 use super::{Wrong, children, damaged, named, unsupported, wrong};
-use crate::error::MeshProblem;
 use crate::mesh::exact::{Bounds, rounded};
 use crate::mesh::polygon::Cutter;
+use crate::mesh::triangles::too_many_vertices;
+use crate::mesh::words::no_such_vertex;
 use glam::DVec3;
 use roxmltree::Node;
 
@@ -89,7 +90,7 @@ impl Geometry {
             let what = format!("{count} positions in steps of {stride} need more than {} numbers", values.len());
             return Err(wrong(accessor, damaged(what)));
         }
-        let too_many = |_| wrong(accessor, MeshProblem::TooManyVertices);
+        let too_many = |_| wrong(accessor, too_many_vertices());
         let range = (u32::try_from(self.vertices.len()).map_err(too_many)?, u32::try_from(count).map_err(too_many)?);
         let positions = values.get(offset as usize..).unwrap_or_default().chunks(stride as usize).take(count as usize);
         let first = self.vertices.len();
@@ -227,8 +228,7 @@ impl Corners<'_, '_> {
         for corner in corners {
             let index = corner.get(self.offset).copied().unwrap_or(u32::MAX);
             if index >= self.count {
-                let problem = MeshProblem::NoSuchVertex { index: index.into(), vertices: self.count.into() };
-                return Err(wrong(self.primitive, problem));
+                return Err(wrong(self.primitive, no_such_vertex(index, self.count.into())));
             }
             face.push(self.base + index);
         }

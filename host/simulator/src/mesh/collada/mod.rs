@@ -12,11 +12,13 @@ mod transform;
 use super::exact::Moved;
 use super::placed::Placed;
 use super::words::shown;
-use crate::error::{Error, MeshProblem, Place, Result};
+use super::{unread, words};
+use crate::error::{Error, Place, Result};
 use geometry::Geometry;
 use glam::{DAffine3, DMat3, DVec3};
 use roxmltree::{Document, Node, NodeId};
 use std::collections::HashMap;
+use std::fmt::Display;
 use std::path::Path;
 
 /// Reads the mesh of a COLLADA file, how many millimeters its unit is, if it says, and remarks on the file; errors name `path`.
@@ -26,7 +28,7 @@ use std::path::Path;
 /// face is left.
 pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<(Moved, Option<f64>, Vec<String>)> {
     let text = text(bytes, path)?;
-    let here = |problem| Error::variant_at(Place::file(path), problem);
+    let here = |error: Error| error.at(Place::file(path));
     let document = Document::parse(&text).map_err(|error| {
         let what = match &error {
             roxmltree::Error::DtdDetected => "it has a document type declaration, which is not read".into(),
@@ -39,7 +41,7 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<(Moved, Option<f64>, Ve
             0 => Place::file(path),
             row => Place::line(path, row.into()),
         };
-        Error::variant_at(place, damaged(what))
+        damaged(what).at(place)
     })?;
     let root = document.root_element();
     if !named(root, "COLLADA") {
@@ -47,7 +49,7 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<(Moved, Option<f64>, Ve
         if ["robot", "sdf", "mujoco"].contains(&name.as_str()) {
             let what = format!("a description of a robot or a world (<{name}>)");
             let instead = "Give the meshes that it names, with --true-size and the unit that its scale makes of them";
-            return Err(here(MeshProblem::Unsupported { what, instead }));
+            return Err(here(unread::unsupported(what, instead)));
         }
         return Err(here(damaged(format!("its root is <{name}>, not <COLLADA>"))));
     }
@@ -55,11 +57,11 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<(Moved, Option<f64>, Ve
     let millimeters = scene.fill(root).and_then(|()| millimeters(root)).map_err(|Wrong { node, line, problem }| {
         let position = document.get_node(node).map_or(0, |node| node.range().start);
         let row = u64::from(document.text_pos_at(position).row);
-        Error::variant_at(Place::line(path, row + line), problem)
+        problem.at(Place::line(path, row + line))
     })?;
     let note = || format!("{} states no upward axis: y is up, by the standard of COLLADA", path.display());
     let notes = if stated(root, "up_axis").is_none() { vec![note()] } else { Vec::new() };
-    Ok((scene.placed.into_mesh().map_err(here)?, millimeters, notes))
+    Ok((scene.placed.into_mesh(), millimeters, notes))
 }
 
 /// The file's text. Names in it may be in Latin-1, if it says so: numbers are ASCII in either.
@@ -74,13 +76,13 @@ fn text(bytes: &[u8], path: &Path) -> Result<String> {
                 return Ok(bytes.iter().map(|&byte| char::from(byte)).collect());
             }
             let what = "it is not text in UTF-8".into();
-            Err(Error::variant_at(Place::byte(path, error.valid_up_to() as u64), damaged(what)))
+            Err(damaged(what).at(Place::byte(path, error.valid_up_to() as u64)))
         }
     }
 }
 
-fn damaged(what: String) -> MeshProblem {
-    MeshProblem::Damaged { format: "COLLADA", what }
+fn damaged(what: String) -> Error {
+    words::damaged("COLLADA", what)
 }
 
 /// True if an element has this name, in whichever namespace: versions differ in it.
@@ -134,16 +136,16 @@ struct Wrong {
     node: NodeId,
     /// Number of lines after the element's first.
     line: u64,
-    problem: MeshProblem,
+    problem: Error,
 }
 
 /// Blames a problem on an element.
-fn wrong(node: Node<'_, '_>, problem: MeshProblem) -> Wrong {
+fn wrong(node: Node<'_, '_>, problem: Error) -> Wrong {
     Wrong { node: node.id(), line: 0, problem }
 }
 
-fn unsupported(node: Node<'_, '_>, what: impl Into<String>, instead: &'static str) -> Wrong {
-    wrong(node, MeshProblem::Unsupported { what: what.into(), instead })
+fn unsupported(node: Node<'_, '_>, what: impl Display, instead: &str) -> Wrong {
+    wrong(node, unread::unsupported(what, instead))
 }
 
 struct Scene<'a, 'input> {

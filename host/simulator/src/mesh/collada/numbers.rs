@@ -1,18 +1,18 @@
 //! The numbers in an element.
 
 use super::{Wrong, damaged};
-use crate::error::MeshProblem;
-use crate::mesh::words::shown;
+use crate::error::Error;
+use crate::mesh::words::{not_a_number, shown};
 use roxmltree::Node;
 
 /// A number of a COLLADA file.
 pub(super) trait Number: std::str::FromStr {
     /// Problem with it, if there is one.
-    fn problem(&self, word: &str) -> Option<MeshProblem>;
+    fn problem(&self, word: &str) -> Option<Error>;
 }
 
 impl Number for f64 {
-    fn problem(&self, word: &str) -> Option<MeshProblem> {
+    fn problem(&self, word: &str) -> Option<Error> {
         let what = || damaged(format!("the number {:?} is not finite", shown(word.as_bytes())));
         // Coordinates are kept as `f32`.
         (!(*self as f32).is_finite()).then(what)
@@ -20,7 +20,7 @@ impl Number for f64 {
 }
 
 impl Number for u32 {
-    fn problem(&self, _: &str) -> Option<MeshProblem> {
+    fn problem(&self, _: &str) -> Option<Error> {
         None
     }
 }
@@ -37,7 +37,7 @@ pub(super) fn numbers<T: Number>(node: Node<'_, '_>) -> Result<Vec<T>, Wrong> {
                     numbers.push(number);
                     problem
                 }
-                Err(_) => Some(MeshProblem::NotANumber { text: shown(word.as_bytes()) }),
+                Err(_) => Some(not_a_number(word.as_bytes())),
             };
             if let Some(problem) = problem {
                 // A word is a part of the text, so it starts somewhere in it.

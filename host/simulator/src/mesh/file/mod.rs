@@ -1,8 +1,9 @@
 //! Mesh files of every kind: which kind a file is, by its content, and its mesh.
 
+use super::placed::too_large;
 use super::text::Written;
 use super::{Mesh, collada, gltf, obj, ply, stl, unread};
-use crate::error::{Error, MeshProblem, Place, Result};
+use crate::error::{Error, Place, Result};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
@@ -94,8 +95,8 @@ const MOST_OF_A_PIPE: u64 = 1 << 30;
 /// Memory: at most 256 bytes for each byte of the file (and of those that a glTF file names), and 1 MB.
 ///
 /// # Errors
-/// [`Kind::Io`](crate::error::Kind::Io) when the file cannot be read; a [`MeshProblem`] with its line or byte where the file is damaged, or uses
-/// unsupported features, and with the file when there is no face or each is a single point.
+/// [`Kind::Io`](crate::error::Kind::Io) when the file cannot be read; with its line or byte where the file is damaged or
+/// uses unsupported features, and with the file when there is no face or each is a single point.
 pub fn read(path: &Path) -> Result<Contents> {
     let io = |source| Error::io(path, "read the mesh", source);
     let file = File::open(path).map_err(io)?;
@@ -106,7 +107,7 @@ pub fn read(path: &Path) -> Result<Contents> {
     let mut bytes = Vec::new();
     file.take(MOST_OF_A_PIPE + 1).read_to_end(&mut bytes).map_err(io)?;
     if bytes.len() as u64 > MOST_OF_A_PIPE {
-        return Err(Error::variant_at(Place::file(path), MeshProblem::TooLarge { limit: MOST_OF_A_PIPE }));
+        return Err(too_large(MOST_OF_A_PIPE).at(Place::file(path)));
     }
     parse_buffered(bytes.as_slice(), bytes.len() as u64, path, path.parent())
 }
@@ -131,28 +132,18 @@ fn parse_buffered(mut reader: impl BufRead, length: u64, path: &Path, folder: Op
     parse_usual(text.as_slice(), text.len() as u64, path, folder)
 }
 
-/// The error of a text that was read as OBJ because it is nothing else, and has no faces.
-fn not_obj(error: Error, path: &Path) -> Error {
-    let is_called_so = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj"));
-    if is_called_so || error.problem() != Some(&MeshProblem::NoFaces) {
-        return error;
-    }
-    let what = "a file that is neither OBJ, STL, PLY, glTF nor COLLADA".into();
-    Error::variant_at(Place::file(path), MeshProblem::Unsupported { what, instead: "Export a mesh as one of these" })
-}
-
 fn parse_usual(mut reader: impl BufRead, length: u64, path: &Path, folder: Option<&Path>) -> Result<Contents> {
     let io = |source| Error::io(path, "read the mesh", source);
     let head = reader.fill_buf().map_err(io)?;
     if !stl::is_binary(head, length)
         && let Some(problem) = unread::problem(head, path)
     {
-        return Err(Error::variant_at(Place::file(path), problem));
+        return Err(problem.at(Place::file(path)));
     }
     let mut notes = Vec::new();
     let format = Format::of_usual(head, length, path.extension().and_then(|extension| extension.to_str()));
     let ((mesh, moved, step), millimeters) = match format {
-        Format::Obj => (obj::parse_moved(reader, path).map_err(|error| not_obj(error, path))?, None),
+        Format::Obj => (obj::parse_moved(reader, path)?, None),
         Format::Stl => {
             let (moved, odd) = stl::parse(reader, length, path)?;
             notes = odd;
@@ -174,5 +165,12 @@ fn parse_usual(mut reader: impl BufRead, length: u64, path: &Path, folder: Optio
             (moved, millimeters)
         }
     };
+    // A text is read as OBJ because it is nothing else.
+    let is_called_obj = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj"));
+    if format == Format::Obj && mesh.triangles.is_empty() && !is_called_obj {
+        let what = "a file that is neither OBJ, STL, PLY, glTF nor COLLADA";
+        return Err(unread::unsupported(what, "Export a mesh as one of these").at(Place::file(path)));
+    }
+    let mesh = mesh.usable().map_err(|error| error.at(Place::file(path)))?;
     Ok(Contents { mesh, moved, step, millimeters, format, notes })
 }

@@ -2,7 +2,8 @@
 
 use super::document::{Accessor, Document, Extensions, SparsePart};
 use super::extension::{COMPRESSED, QUANTIZED};
-use crate::error::MeshProblem;
+use crate::error::{Error, Result};
+use crate::mesh::{unread::unsupported, words};
 use std::borrow::Cow;
 
 /// Data that accessors read from.
@@ -13,10 +14,8 @@ pub(super) struct Data<'a> {
     pub(super) most_zeros: u64,
 }
 
-type Result<T> = std::result::Result<T, MeshProblem>;
-
-pub(super) fn damaged(what: String) -> MeshProblem {
-    MeshProblem::Damaged { format: "glTF", what }
+pub(super) fn damaged(what: String) -> Error {
+    words::damaged("glTF", what)
 }
 
 /// The numbers of components.
@@ -31,7 +30,7 @@ impl<'a> Data<'a> {
         let accessor = self.accessor(index)?;
         if accessor.shape == "VEC3" && accessor.component_type != FLOAT {
             let what = format!("positions that are not floats ({QUANTIZED})");
-            return Err(MeshProblem::Unsupported { what, instead: "Export it without quantization" });
+            return Err(unsupported(what, "Export it without quantization"));
         }
         if accessor.shape != "VEC3" || accessor.normalized {
             return Err(damaged(format!("accessors[{index}] gives positions, but is not VEC3 of floats")));
@@ -120,7 +119,7 @@ impl<'a> Data<'a> {
     }
 
     /// Reason why there are no elements: an extension that compresses them, or damage.
-    fn without_data(&self, name: &str, extensions: &Extensions) -> MeshProblem {
+    fn without_data(&self, name: &str, extensions: &Extensions) -> Error {
         let own = extensions.iter().flat_map(|extensions| extensions.keys());
         let known = |name: &&String| COMPRESSED.contains(&name.as_str());
         match own.chain(&self.document.extensions_used).find(known) {

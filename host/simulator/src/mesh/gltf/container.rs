@@ -2,8 +2,9 @@
 
 use super::damaged;
 use super::document::{Buffer, Document};
-use crate::error::{Error, MeshProblem, Place, Result};
-use crate::mesh::unread::is_pointer;
+use crate::error::{Error, Place, Result};
+use crate::mesh::unread::{self, is_pointer};
+use crate::mesh::words;
 use base64::Engine;
 use std::borrow::Cow;
 use std::io::Read;
@@ -23,15 +24,13 @@ pub(super) fn parts<'a>(bytes: &'a [u8], path: &Path) -> Result<Parts<'a>> {
         return Ok(Parts { json, start: (bytes.len() - json.len()) as u64, binary: None });
     }
     let number = |offset: usize| bytes.get(offset..)?.first_chunk().map(|bytes| u32::from_le_bytes(*bytes));
-    let wrong = |offset: usize, what: String| {
-        Error::variant_at(Place::byte(path, offset as u64), MeshProblem::Damaged { format: "GLB", what })
-    };
+    let wrong = |offset: usize, what: String| words::damaged("GLB", what).at(Place::byte(path, offset as u64));
     match (number(4), number(8)) {
         (Some(2), Some(length)) if length as usize == bytes.len() => {}
         (Some(2), Some(length)) => {
             return Err(wrong(8, format!("it states a length of {length} bytes, but has {}", bytes.len())));
         }
-        (Some(version), Some(_)) => return Err(Error::variant_at(Place::byte(path, 4), super::other_version(version))),
+        (Some(version), Some(_)) => return Err(super::other_version(version).at(Place::byte(path, 4))),
         _ => return Err(wrong(bytes.len(), "it ends in its header".into())),
     }
     let (mut json, mut binary) = (None, None);
@@ -99,8 +98,7 @@ fn outside(uri: &str, index: usize, buffer: &Buffer, path: &Path, folder: Option
         let decoded = base64::engine::general_purpose::STANDARD.decode(encoded.trim_ascii());
         return decoded.map_err(|error| damaged(path, format!("buffers[{index}] is not valid base64: {error}")));
     }
-    let unsupported =
-        |what: String, instead| Err(Error::variant_at(Place::file(path), MeshProblem::Unsupported { what, instead }));
+    let unsupported = |what: String, instead| Err(unread::unsupported(what, instead).at(Place::file(path)));
     let name = unescaped(uri);
     let beside = Path::new(&name);
     let is_beside =
@@ -123,7 +121,7 @@ fn outside(uri: &str, index: usize, buffer: &Buffer, path: &Path, folder: Option
             file.take(1024).read_to_end(&mut head).map_err(io)?;
         }
         if is_pointer(&head) {
-            return Err(Error::variant_at(Place::file(&place), MeshProblem::LfsPointer));
+            return Err(unread::pointer().at(Place::file(&place)));
         }
         let what = format!("buffers[{index}] of {} states {} bytes", path.display(), buffer.byte_length);
         return Err(damaged(&place, format!("{what}, but the file has {}", metadata.len())));

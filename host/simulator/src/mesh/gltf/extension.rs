@@ -1,6 +1,7 @@
 //! Extensions of glTF: those that change the surface, and those that do not.
 
-use crate::error::MeshProblem;
+use crate::error::{Error, Result};
+use crate::mesh::unread;
 
 /// Says which nodes are hidden.
 const VISIBILITY: &str = "KHR_node_visibility";
@@ -31,7 +32,7 @@ const HARMLESS: [&str; 15] = [
 
 /// Refuses a file that requires an extension which may change the surface. Quantization may be that of normals and
 /// textures: positions that have it are refused where they are read.
-pub(super) fn check_required(required: &[String]) -> Result<(), MeshProblem> {
+pub(super) fn check_required(required: &[String]) -> Result<()> {
     let is_read = |name: &str| name == QUANTIZED || name == VISIBILITY;
     let is_harmless = |name: &&String| is_read(name) || HARMLESS.iter().any(|harmless| name.starts_with(harmless));
     let harmful = required.iter().find(|name| !is_harmless(name));
@@ -39,7 +40,7 @@ pub(super) fn check_required(required: &[String]) -> Result<(), MeshProblem> {
 }
 
 /// The refusal of an extension by its name.
-pub(super) fn unsupported(name: &str) -> MeshProblem {
+pub(super) fn unsupported(name: &str) -> Error {
     let kind = match name {
         "KHR_draco_mesh_compression" => "Draco compression",
         QUANTIZED => "quantization",
@@ -48,5 +49,5 @@ pub(super) fn unsupported(name: &str) -> MeshProblem {
         _ => "an extension",
     };
     let shown: String = name.chars().take(80).collect();
-    MeshProblem::Unsupported { what: format!("{kind} ({shown})"), instead: "Export it as plain glTF 2.0, without it" }
+    unread::unsupported(format!("{kind} ({shown})"), "Export it as plain glTF 2.0, without it")
 }

@@ -12,7 +12,10 @@ mod extension;
 
 use super::exact::Moved;
 use super::placed::Placed;
-use crate::error::{Error, MeshProblem, Place, Result};
+use super::triangles::too_many_vertices;
+use super::unread::unsupported;
+use super::words::no_such_vertex;
+use crate::error::{Error, Place, Result};
 use accessor::Data;
 use document::{Document, Node, Primitive};
 use glam::{DAffine3, DMat4, DQuat, DVec3, Vec3};
@@ -28,7 +31,7 @@ pub(super) fn parse(bytes: &[u8], path: &Path, folder: Option<&Path>) -> Result<
     let parts = container::parts(bytes, path)?;
     let document: Document = serde_json::from_slice(parts.json).map_err(|error| {
         if serde_json::from_slice::<document::Version1>(parts.json).is_ok() {
-            return Error::variant_at(Place::file(path), other_version("1.0"));
+            return other_version("1.0").at(Place::file(path));
         }
         let mut reason = error.to_string();
         reason.truncate(reason.rfind(" at line ").unwrap_or(reason.len()));
@@ -36,9 +39,9 @@ pub(super) fn parse(bytes: &[u8], path: &Path, folder: Option<&Path>) -> Result<
             start @ 4.. => Place::byte(path, start + offset(parts.json, error.line(), error.column())),
             _ => Place::line(path, error.line().max(1) as u64),
         };
-        Error::variant_at(place, MeshProblem::Damaged { format: "glTF", what: reason.chars().take(200).collect() })
+        accessor::damaged(reason.chars().take(200).collect()).at(place)
     })?;
-    let here = |problem| Error::variant_at(Place::file(path), problem);
+    let here = |error: Error| error.at(Place::file(path));
     check(&document).map_err(here)?;
     let buffers = container::buffers(&document, &parts, path, folder)?;
     let length = bytes.len() as u64 + buffers.iter().flatten().map(|buffer| buffer.len() as u64).sum::<u64>();
@@ -56,7 +59,7 @@ pub(super) fn parse(bytes: &[u8], path: &Path, folder: Option<&Path>) -> Result<
 
 /// Something is wrong with a file as a whole.
 fn damaged(path: &Path, what: String) -> Error {
-    Error::variant_at(Place::file(path), accessor::damaged(what))
+    accessor::damaged(what).at(Place::file(path))
 }
 
 /// Offset of a line and a column (both from 1) in a text.
@@ -65,7 +68,7 @@ fn offset(text: &[u8], line: usize, column: usize) -> u64 {
     (before + column.saturating_sub(1)).min(text.len()) as u64
 }
 
-fn check(document: &Document) -> Result<(), MeshProblem> {
+fn check(document: &Document) -> Result<()> {
     // A file of a later 2.x states in `minVersion` which version a reader must know; this one knows 2.0.
     let version = document.asset.min_version.as_ref().unwrap_or(&document.asset.version);
     let is_known = match document.asset.min_version {
@@ -79,9 +82,9 @@ fn check(document: &Document) -> Result<(), MeshProblem> {
 }
 
 /// The refusal of a version that is not read.
-fn other_version(version: impl std::fmt::Display) -> MeshProblem {
+fn other_version(version: impl std::fmt::Display) -> Error {
     let what = format!("glTF of version {}", version.to_string().chars().take(20).collect::<String>());
-    MeshProblem::Unsupported { what, instead: "Export it as glTF 2.0" }
+    unsupported(what, "Export it as glTF 2.0")
 }
 
 struct Scene<'a> {
@@ -94,7 +97,7 @@ struct Scene<'a> {
 
 impl Scene<'_> {
     /// The mesh of the scene, and the number of nodes that are not visible.
-    fn mesh(mut self) -> Result<(Moved, usize), MeshProblem> {
+    fn mesh(mut self) -> Result<(Moved, usize)> {
         let nodes = &self.document.nodes;
         let mut waiting: Vec<(u32, DAffine3)> = Vec::new();
         let add = |nodes: &[u32], transform: &DAffine3, waiting: &mut Vec<_>| {
@@ -146,23 +149,23 @@ impl Scene<'_> {
             }
             add(&node.children, &transform, &mut waiting);
         }
-        Ok((self.placed.into_mesh()?, self.hidden))
+        Ok((self.placed.into_mesh(), self.hidden))
     }
 
     /// Rejects features that would place or bend a node's mesh in another way than its transform.
-    fn check_node(&self, node: &Node) -> Result<(), MeshProblem> {
+    fn check_node(&self, node: &Node) -> Result<()> {
         if node.extensions.as_ref().is_some_and(|extensions| extensions.instancing.is_some()) {
             return Err(extension::unsupported("EXT_mesh_gpu_instancing"));
         }
         if node.skin.is_some() {
-            let what = "a skin, which bends the mesh,".into();
-            return Err(MeshProblem::Unsupported { what, instead: "Apply the skin to the mesh, then export it" });
+            let what = "a skin, which bends the mesh,";
+            return Err(unsupported(what, "Apply the skin to the mesh, then export it"));
         }
         is_still(&node.weights)
     }
 
     /// Places the mesh of this number.
-    fn place(&mut self, index: u32, transform: &DAffine3) -> Result<(), MeshProblem> {
+    fn place(&mut self, index: u32, transform: &DAffine3) -> Result<()> {
         let mesh = self.document.meshes.get(index as usize);
         let mesh = mesh.ok_or_else(|| accessor::damaged(format!("meshes[{index}] is missing")))?;
         is_still(&mesh.weights)?;
@@ -190,10 +193,10 @@ impl Scene<'_> {
             let count = vertices.len() as u64;
             let indices = match primitive.indices {
                 Some(accessor) => self.data.indices(accessor, &primitive.extensions)?,
-                None => (0..u32::try_from(count).map_err(|_| MeshProblem::TooManyVertices)?).collect(),
+                None => (0..u32::try_from(count).map_err(|_| too_many_vertices())?).collect(),
             };
             if let Some(&wrong) = indices.iter().find(|&&index| u64::from(index) >= count) {
-                return Err(MeshProblem::NoSuchVertex { index: wrong.into(), vertices: count });
+                return Err(no_such_vertex(wrong, count));
             }
             pending.1 += faces.count(indices.len());
             self.placed.check(pending.0, pending.1)?;
@@ -216,7 +219,7 @@ impl Scene<'_> {
 type Part = (Vec<[f32; 3]>, Vec<[u32; 3]>);
 
 /// A primitive without positions has them in an extension, or is damaged.
-fn without_positions(mesh: u32, primitive: &Primitive) -> MeshProblem {
+fn without_positions(mesh: u32, primitive: &Primitive) -> Error {
     let mut extensions = primitive.extensions.iter().flat_map(|extensions| extensions.keys());
     match extensions.find(|name| extension::COMPRESSED.contains(&name.as_str())) {
         Some(name) => extension::unsupported(name),
@@ -225,12 +228,12 @@ fn without_positions(mesh: u32, primitive: &Primitive) -> MeshProblem {
 }
 
 /// Refuses morphs that are not at rest.
-fn is_still(weights: &Option<Vec<f64>>) -> Result<(), MeshProblem> {
+fn is_still(weights: &Option<Vec<f64>>) -> Result<()> {
     if weights.iter().flatten().all(|&weight| weight == 0.0) {
         return Ok(());
     }
-    let what = "a morph with weights, which bends the mesh,".into();
-    Err(MeshProblem::Unsupported { what, instead: "Apply the morph to the mesh, then export it" })
+    let what = "a morph with weights, which bends the mesh,";
+    Err(unsupported(what, "Apply the morph to the mesh, then export it"))
 }
 
 /// Rule that turns indices into triangles.
@@ -242,7 +245,7 @@ enum Faces {
 
 impl Faces {
     /// Pattern of a primitive's mode; none for points and lines, which are no surface.
-    fn of(mode: Option<u32>) -> Result<Option<Self>, MeshProblem> {
+    fn of(mode: Option<u32>) -> Result<Option<Self>> {
         match mode {
             None | Some(4) => Ok(Some(Self::Each)),
             Some(5) => Ok(Some(Self::Strip)),
@@ -286,7 +289,7 @@ impl Faces {
 }
 
 /// Transform of a node's mesh, within its parent.
-fn transform(node: &Node, index: u32) -> Result<DAffine3, MeshProblem> {
+fn transform(node: &Node, index: u32) -> Result<DAffine3> {
     if let Some(matrix) = &node.matrix {
         let matrix = DMat4::from_cols_array(matrix);
         if matrix.row(3).to_array() != [0.0, 0.0, 0.0, 1.0] {

@@ -1,7 +1,7 @@
 //! The header of a PLY file, checked line by line.
 
-use crate::error::{Error, MeshProblem, Place, Result};
-use crate::mesh::words::{number, shown};
+use crate::error::{Error, Place, Result};
+use crate::mesh::words::{self, number, shown};
 use serde_ply::PlyFormat;
 use std::io::{BufRead, Read};
 use std::path::Path;
@@ -51,9 +51,7 @@ impl Header {
             let read = read.map_err(|source| Error::io(path, "read the mesh", source))?;
             bytes += read as u64;
             lines += 1;
-            let damaged = |what: String| {
-                Error::variant_at(Place::line(path, lines), MeshProblem::Damaged { format: "PLY", what })
-            };
+            let damaged = |what: String| words::damaged("PLY", what).at(Place::line(path, lines));
             let words: Vec<&[u8]> = raw.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()).collect();
             if lines == 1 && words != [b"ply"] {
                 let is_of_old_mac = raw.starts_with(b"ply\r") && !raw.ends_with(b"\r\n");
@@ -98,9 +96,7 @@ impl Header {
                 _ => return Err(damaged(format!("{:?} is not a header line", shown(raw.trim_ascii())))),
             }
         }
-        let whole = |line: u64, what: &str| {
-            Error::variant_at(Place::line(path, line), MeshProblem::Damaged { format: "PLY", what: what.into() })
-        };
+        let whole = |line: u64, what: &str| words::damaged("PLY", what).at(Place::line(path, line));
         let format = format.ok_or_else(|| whole(lines, "its header has no line \"format ... 1.0\""))?;
         elements.retain(|element| element.count > 0 || !element.properties.is_empty());
         for element in &elements {

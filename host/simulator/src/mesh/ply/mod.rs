@@ -10,8 +10,9 @@ mod header;
 use super::Mesh;
 use super::exact::{Bounds, Moved, rounded, step_of_decimals, step_of_f32};
 use super::polygon::Cutter;
-use super::unread;
-use crate::error::{Error, MeshProblem, Place, Result};
+use super::triangles::too_many_vertices;
+use super::{unread, words};
+use crate::error::{Error, Place, Result};
 use counted::{Counted, Counts};
 use header::Header;
 use serde::de::{Error as _, SeqAccess, Visitor};
@@ -30,13 +31,13 @@ use std::path::Path;
 pub(super) fn parse(mut reader: impl BufRead, path: &Path) -> Result<Moved> {
     let Header { format, text, bytes, lines, is_cloud } = Header::read(&mut reader, path)?;
     if is_cloud {
-        return Err(Error::variant_at(Place::file(path), unread::cloud()));
+        return Err(unread::cloud().at(Place::file(path)));
     }
     let is_text = format == PlyFormat::Ascii;
     let counts = Counts::starting_at(bytes, lines);
     let damaged = |what: String| {
         let place = if is_text { Place::line(path, counts.line.get()) } else { Place::byte(path, counts.byte.get()) };
-        Error::variant_at(place, MeshProblem::Damaged { format: "PLY", what })
+        words::damaged("PLY", what).at(place)
     };
     // The end of a text ends its last number too.
     let end: &[u8] = if is_text { b"\n" } else { b"" };
@@ -67,16 +68,15 @@ pub(super) fn parse(mut reader: impl BufRead, path: &Path) -> Result<Moved> {
             length => reader.consume(length),
         }
     }
-    let here = |problem| Error::variant_at(Place::file(path), problem);
     let offset = Bounds::of(faces.used(&vertices.0).chain(strips.used(&vertices.0))).offset();
     let rounded = vertices.0.iter().map(|&vertex| rounded(vertex, offset)).collect();
     let mut mesh = Mesh { vertices: rounded, triangles: Vec::new() };
-    faces.cut(&mut mesh).and_then(|()| strips.cut_strips(&mut mesh)).map_err(here)?;
+    faces.cut(&mut mesh).and_then(|()| strips.cut_strips(&mut mesh)).map_err(|error| error.at(Place::file(path)))?;
     let step = match is_text {
         true => step_of_decimals(&vertices.0, &mesh.triangles),
         false => step_of_f32(vertices.0.iter().copied()),
     };
-    Ok((mesh.usable().map_err(here)?, offset, step))
+    Ok((mesh, offset, step))
 }
 
 /// Receiver of the rows of an element, one by one.
@@ -131,11 +131,11 @@ impl Collect for Vertices {
     fn take(&mut self, Vertex { x, y, z }: Vertex) -> Result<(), String> {
         for (axis, value) in [('x', x), ('y', y), ('z', z)] {
             if !(value as f32).is_finite() {
-                return Err(MeshProblem::NotFinite { axis, text: format!("{value:e}") }.to_string());
+                return Err(words::not_finite(axis, format!("{value:e}")).what().into());
             }
         }
         if self.0.len() >= u32::MAX as usize {
-            return Err(MeshProblem::TooManyVertices.to_string());
+            return Err(too_many_vertices().what().into());
         }
         self.0.push([x, y, z]);
         Ok(())
@@ -177,7 +177,7 @@ impl Corners {
         self.indices.iter().filter_map(vertex)
     }
 
-    fn cut(&self, mesh: &mut Mesh) -> Result<(), MeshProblem> {
+    fn cut(&self, mesh: &mut Mesh) -> Result<()> {
         let Mesh { vertices, triangles } = mesh;
         let (mut cutter, mut face) = (Cutter::default(), Vec::new());
         let mut rest = self.indices.as_slice();
@@ -194,7 +194,7 @@ impl Corners {
     }
 
     /// Triangle strips: each vertex makes a triangle with the two before it, every second one turned; -1 begins another strip.
-    fn cut_strips(&self, mesh: &mut Mesh) -> Result<(), MeshProblem> {
+    fn cut_strips(&self, mesh: &mut Mesh) -> Result<()> {
         let mut rest = self.indices.as_slice();
         for &arity in &self.arities {
             let (strips, others) = rest.split_at_checked(arity as usize).unwrap_or_default();
@@ -217,9 +217,9 @@ impl Corners {
 }
 
 /// The vertex that a face names.
-fn vertex(index: i64, vertices: usize) -> Result<u32, MeshProblem> {
+fn vertex(index: i64, vertices: usize) -> Result<u32> {
     let found = u32::try_from(index).ok().filter(|&index| (index as usize) < vertices);
-    found.ok_or(MeshProblem::NoSuchVertex { index, vertices: vertices as u64 })
+    found.ok_or_else(|| words::no_such_vertex(index, vertices as u64))
 }
 
 /// Rows that do not shape the mesh.

@@ -3,7 +3,7 @@
 mod layout;
 mod search;
 
-use crate::error::{Error, MeshProblem, Place, Result};
+use crate::error::{Error, Kind, Place, Result, problem};
 use crate::mesh::file;
 use crate::mesh::{BACKGROUND, Instance, Mesh, Object, builtin, facts};
 use rayon::prelude::*;
@@ -61,7 +61,7 @@ pub struct Loaded {
 /// The objects of all `sources`, found as [`objects`](fn@objects) finds them, with notes on the search.
 ///
 /// # Errors
-/// Errors of [`objects`](fn@objects); of several meshes all that cannot be read are named, in [`MeshProblem::Unread`].
+/// Errors of [`objects`](fn@objects); where some of several meshes cannot be read, [`Kind::Unread`] names them all.
 pub fn load(sources: &[String], search: Search) -> Result<Loaded> {
     let (found, note) = found(sources, search)?;
     let count = found.iter().map(Source::count).sum();
@@ -84,8 +84,22 @@ fn refuse(mut errors: Vec<Error>, count: usize) -> Result<()> {
     match (errors.len(), count) {
         (0, _) => Ok(()),
         (1, 1) => errors.pop().map_or(Ok(()), Err),
-        _ => Err(MeshProblem::Unread { count, errors: errors.iter().map(said).collect() }.into()),
+        (unread, _) => {
+            let fix = match unread {
+                1 => "Repair the file, or leave it out.",
+                _ => "Repair these files, or leave them out.",
+            };
+            let listed = errors.iter().map(said).collect::<Vec<_>>().join("\n  ");
+            let error = problem!("{unread} of {count} meshes cannot be read:\n  {listed}");
+            Err(error.fix(fix).as_kind(Kind::Unread))
+        }
     }
+}
+
+/// A directory holds no mesh.
+fn no_meshes() -> Error {
+    problem!("no mesh here: no file ends in .obj, .stl, .ply, .gltf, .glb or .dae")
+        .fix("Give a directory that holds such files.")
 }
 
 /// An error without advice.
@@ -115,7 +129,7 @@ fn same(objects: &[Object]) -> Vec<String> {
 /// The only object of `source`, found as [`objects`](fn@objects) finds it.
 ///
 /// # Errors
-/// Errors of [`objects`](fn@objects), and [`MeshProblem::SeveralObjects`].
+/// Errors of [`objects`](fn@objects), and if the source gives several objects.
 pub fn object(source: &str) -> Result<Object> {
     let (mut found, note) = found(&[source.to_owned()], Search::default())?;
     match (found.pop(), found.len()) {
@@ -124,7 +138,9 @@ pub fn object(source: &str) -> Result<Object> {
             object.notes.extend(note);
             Ok(object)
         }
-        (_, others) => Err(Error::variant_at(Place::file(source), MeshProblem::SeveralObjects { count: others + 1 })),
+        (_, others) => Err(problem!("{} objects, where one is needed", others + 1)
+            .fix("Give one mesh file, or the name of one built-in object.")
+            .at(Place::file(source))),
     }
 }
 
@@ -181,7 +197,7 @@ impl Source {
         let count = self.count();
         let (object, errors) = self.read_each();
         refuse(errors, count)?;
-        object.ok_or_else(|| MeshProblem::NoMeshes.into())
+        object.ok_or_else(no_meshes)
     }
 
     /// The object with its readable meshes, and the errors of the others.
@@ -301,7 +317,10 @@ fn found(sources: &[String], search: Search) -> Result<(Vec<Source>, Option<Stri
             let path = Path::new(source);
             let metadata = std::fs::metadata(path).map_err(|error| match error.kind() {
                 std::io::ErrorKind::NotFound => {
-                    Error::variant_at(Place::file(path), MeshProblem::NoSuchSource { builtin: builtin::names().into() })
+                    let known = builtin::names().join(", ");
+                    problem!("cannot read the mesh: this is neither a file, a directory nor a built-in object")
+                        .fix(format!("Check the path, or give one of the built-in objects: {known}."))
+                        .at(Place::file(path))
                 }
                 _ => Error::io(path, "read the mesh", error),
             })?;
@@ -316,8 +335,11 @@ fn found(sources: &[String], search: Search) -> Result<(Vec<Source>, Option<Stri
                     finder.search(path, LEVELS)?;
                 }
                 if finder.found.len() + found.len() == before {
-                    let problem = finder.note().map_or(MeshProblem::NoMeshes, |files| MeshProblem::NoneRead { files });
-                    return Err(Error::variant_at(Place::file(path), problem));
+                    let none_read = |files: String| {
+                        problem!("no mesh that is read here: {files}")
+                            .fix("Convert them, then give the directory again.")
+                    };
+                    return Err(finder.note().map_or_else(no_meshes, none_read).at(Place::file(path)));
                 }
             } else {
                 finder.found.push(Found { path: path.to_owned(), passed: Vec::new() });
@@ -345,17 +367,26 @@ fn found(sources: &[String], search: Search) -> Result<(Vec<Source>, Option<Stri
 }
 
 fn insert(found: &mut BTreeMap<String, Source>, name: String, source: Source) -> Result<()> {
-    let place = |source: &Source| match source {
-        Source::BuiltIn(_) => "builtin".into(),
-        Source::Background => BACKGROUND.into(),
-        Source::File { path, .. } => path.clone(),
-        Source::Instances { files, .. } => files.first().map(|(_, path)| path.clone()).unwrap_or_default(),
+    let place = |source: &Source| -> PathBuf {
+        match source {
+            Source::BuiltIn(_) => "builtin".into(),
+            Source::Background => BACKGROUND.into(),
+            Source::File { path, .. } => path.clone(),
+            Source::Instances { files, .. } => files.first().map(|(_, path)| path.clone()).unwrap_or_default(),
+        }
     };
     if let Some(other) = found.get(&name) {
-        return Err(MeshProblem::SameName { first: place(other), second: place(&source), name }.into());
+        return Err(same_name(&name, [place(other), place(&source)]));
     }
     found.insert(name, source);
     Ok(())
+}
+
+/// Two sources, such as a file or `builtin`, give objects of one name.
+pub fn same_name(name: &str, [first, second]: [PathBuf; 2]) -> Error {
+    problem!("two objects are called {name}: {} and {}", first.display(), second.display())
+        .fix("Rename one of the files, or leave one out.")
+        .as_kind(Kind::SameName { first, second })
 }
 
 /// The objects that the directories in `directory` stand for, one each.

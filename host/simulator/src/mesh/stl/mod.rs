@@ -7,8 +7,9 @@
 
 use super::Mesh;
 use super::exact::{Moved, step_of_decimals, step_of_f32};
-use super::words::{coordinate, shown};
-use crate::error::{Error, MeshProblem, Place, Result};
+use super::triangles::too_many_vertices;
+use super::words::{coordinate, damaged, missing, not_finite, shown};
+use crate::error::{Error, Place, Result};
 use std::collections::HashMap;
 use std::io::{BufRead, ErrorKind, Read};
 use std::path::Path;
@@ -50,7 +51,6 @@ pub(super) fn parse(mut reader: impl BufRead, length: u64, path: &Path) -> Resul
         (welder, note, step)
     };
     let (mesh, moved) = Mesh::from_f64(&welder.vertices, welder.triangles);
-    let mesh = mesh.usable().map_err(|problem| Error::variant_at(Place::file(path), problem))?;
     let notes = note.into_iter().map(|note| format!("{} {note}", path.display())).collect();
     Ok(((mesh, moved, step), notes))
 }
@@ -74,7 +74,7 @@ fn binary(mut reader: impl BufRead, length: u64, path: &Path) -> Result<Noted> {
     let count = stated(&header).unwrap_or_default();
     let other_length = || {
         let what = format!("it states {count} triangles, which are {} bytes, but has {length} bytes", bytes_of(count));
-        Error::variant_at(Place::byte(path, HEADER as u64 - 4), MeshProblem::Damaged { format: "STL", what })
+        damaged("STL", what).at(Place::byte(path, HEADER as u64 - 4))
     };
     let rest = length.checked_sub(bytes_of(count)).filter(|&rest| rest == 0 || count > 0).ok_or_else(other_length)?;
     let mut welder = Welder::default();
@@ -91,12 +91,11 @@ fn binary(mut reader: impl BufRead, length: u64, path: &Path) -> Result<Noted> {
             for (axis, (value, bytes)) in vertex.iter_mut().zip(axes).enumerate() {
                 *value = f64::from(f32::from_le_bytes(*bytes));
                 if !value.is_finite() {
-                    let problem = MeshProblem::NotFinite { axis: AXES[axis], text: value.to_string() };
                     let offset = start + 12 + 12 * number as u64 + 4 * axis as u64;
-                    return Err(Error::variant_at(Place::byte(path, offset), problem));
+                    return Err(not_finite(AXES[axis], value.to_string()).at(Place::byte(path, offset)));
                 }
             }
-            *corner = welder.corner(vertex).map_err(|problem| Error::variant_at(Place::byte(path, start), problem))?;
+            *corner = welder.corner(vertex).map_err(|error| error.at(Place::byte(path, start)))?;
         }
         welder.triangles.push(corners);
     }
@@ -113,8 +112,8 @@ const AXES: [char; 3] = ['x', 'y', 'z'];
 /// An error of reading at `offset`: the end of the file is a damaged file.
 fn ended(source: std::io::Error, path: &Path, offset: u64) -> Error {
     if source.kind() == ErrorKind::UnexpectedEof {
-        let what = "it ends in the middle of a triangle or of its header".into();
-        return Error::variant_at(Place::byte(path, offset), MeshProblem::Damaged { format: "STL", what });
+        let what = "it ends in the middle of a triangle or of its header";
+        return damaged("STL", what).at(Place::byte(path, offset));
     }
     Error::io(path, "read the mesh", source)
 }
@@ -129,9 +128,9 @@ struct Welder {
 
 impl Welder {
     /// The index of the vertex at this place.
-    fn corner(&mut self, vertex: [f64; 3]) -> Result<u32, MeshProblem> {
+    fn corner(&mut self, vertex: [f64; 3]) -> Result<u32> {
         let vertices = &mut self.vertices;
-        let next = u32::try_from(vertices.len()).map_err(|_| MeshProblem::TooManyVertices)?;
+        let next = u32::try_from(vertices.len()).map_err(|_| too_many_vertices())?;
         Ok(*self.places.entry(vertex.map(|x| (x + 0.0).to_bits())).or_insert_with(|| {
             vertices.push(vertex);
             next
@@ -217,10 +216,10 @@ impl<R: BufRead> Text<'_, R> {
                 State::Loop(count @ 0..3) if is(b"vertex") => {
                     let mut vertex = [0.0; 3];
                     for (axis, value) in AXES.into_iter().zip(&mut vertex) {
-                        let word = self.word()?.ok_or(MeshProblem::MissingCoordinate { axis });
-                        *value = word.and_then(|word| coordinate(&word, axis)).map_err(|problem| self.here(problem))?;
+                        let word = self.word()?.ok_or_else(|| missing(axis));
+                        *value = word.and_then(|word| coordinate(&word, axis)).map_err(|error| self.here(error))?;
                     }
-                    corners[count] = welder.corner(vertex).map_err(|problem| self.here(problem))?;
+                    corners[count] = welder.corner(vertex).map_err(|error| self.here(error))?;
                     State::Loop(count + 1)
                 }
                 State::Loop(3) if is(b"endloop") => State::Closed,
@@ -271,8 +270,8 @@ impl<R: BufRead> Text<'_, R> {
         self.next = self.raw.len();
     }
 
-    fn here(&self, problem: MeshProblem) -> Error {
-        Error::variant_at(Place::line(self.path, self.line.max(1)), problem)
+    fn here(&self, error: Error) -> Error {
+        error.at(Place::line(self.path, self.line.max(1)))
     }
 
     fn unexpected(&self, word: Option<Vec<u8>>, expected: &str) -> Error {
@@ -280,6 +279,6 @@ impl<R: BufRead> Text<'_, R> {
             Some(word) => format!("{:?} stands where {expected} must stand", shown(&word)),
             None => format!("it ends where {expected} must stand"),
         };
-        self.here(MeshProblem::Damaged { format: "STL", what })
+        self.here(damaged("STL", what))
     }
 }

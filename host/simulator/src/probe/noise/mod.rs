@@ -13,7 +13,7 @@
 //! // The first contact is 0 again, and the timer counts whole milliseconds.
 //! assert!(noisy[0].times().iter().all(|time| time.micros().is_some_and(|micros| micros % 1_000 == 0)));
 //! assert_eq!(Deviation::from(5_000.0).largest, 5_000.0);
-//! # Ok::<_, palpate_simulator::error::ProbeProblem>(())
+//! # Ok::<_, palpate_simulator::Error>(())
 //! ```
 
 mod grazing;
@@ -21,9 +21,9 @@ mod partial;
 pub mod quantity;
 
 pub use grazing::Grazing;
-pub use partial::{BadNoise, PartialNoise};
+pub use partial::PartialNoise;
 
-use crate::error::{Error, ProbeProblem, Result};
+use crate::error::{Error, Result};
 use crate::probe::approach::{FINGERS, Probe, to_q15};
 use crate::random::{self, Purpose};
 use glam::DVec3;
@@ -115,13 +115,10 @@ impl From<f64> for Deviation {
 
 /// `5ms`, or a range as `0..10ms`.
 impl FromStr for Deviation {
-    type Err = ProbeProblem;
+    type Err = Error;
 
-    fn from_str(text: &str) -> Result<Self, ProbeProblem> {
-        let problem = || ProbeProblem::BadQuantity {
-            text: text.into(),
-            example: "a duration with its unit such as 5ms, or a range such as 0..10ms",
-        };
+    fn from_str(text: &str) -> Result<Self> {
+        let problem = || quantity::bad(text, "a duration with its unit such as 5ms, or a range such as 0..10ms");
         let Some((least, largest)) = text.split_once("..") else {
             return quantity::duration(text).map(Self::from).map_err(|_| problem());
         };

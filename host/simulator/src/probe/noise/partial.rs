@@ -1,7 +1,7 @@
 //! Settings of noise as users write them in one text: `noise=0..5ms,timer=1ms,missed=2%`.
 
 use super::{Deviation, Noise, quantity};
-use crate::error::{Kind, ProbeProblem};
+use crate::error::{Error, Kind, Result, problem};
 use crate::probe::approach::FINGERS;
 use std::fmt;
 use std::str::FromStr;
@@ -21,7 +21,7 @@ use std::str::FromStr;
 /// let noise = given.over(Noise::switch());
 /// assert_eq!((noise.deviation.largest, noise.timer, noise.missed), (5_000.0, 0.0, [0.02; 3]));
 /// assert!("none".parse::<PartialNoise>()?.over(Noise::switch()).is_none());
-/// # Ok::<_, palpate_simulator::probe::noise::BadNoise>(())
+/// # Ok::<_, palpate_simulator::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PartialNoise {
@@ -51,16 +51,10 @@ pub struct PartialNoise {
     pub drift: Option<[f64; 2]>,
 }
 
-/// A text that is not noise: the key, its value, and what to write instead.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{key} is {value:?}; use {wanted}")]
-pub struct BadNoise {
-    /// The key, such as `timer`; `real` where it is the text as a whole.
-    pub key: String,
-    /// The text as written.
-    pub value: String,
-    /// Values that can be written, such as "a duration such as 5ms".
-    pub wanted: String,
+/// The value of a key cannot be used; the key is `real` where it is a part of the text without one.
+fn wrong(key: &'static str, value: &str, wanted: &str) -> Error {
+    let (value, allowed) = (value.to_owned(), wanted.to_owned());
+    problem!("{key} is {value:?}; use {wanted}").as_kind(Kind::Setting { name: key, value, allowed })
 }
 
 impl From<Noise> for PartialNoise {
@@ -144,14 +138,8 @@ impl PartialNoise {
     }
 
     /// Takes the value of a known key.
-    fn set(&mut self, key: &str, value: &str) -> Result<(), BadNoise> {
-        let bad = |problem: ProbeProblem| {
-            let wanted = match problem {
-                ProbeProblem::BadQuantity { example, .. } => example.to_owned(),
-                other => other.to_string(),
-            };
-            BadNoise { key: key.into(), value: value.into(), wanted }
-        };
+    fn set(&mut self, key: &'static str, value: &str) -> Result<()> {
+        let bad = |error: Error| wrong(key, value, error.remedy().trim_start_matches("Give ").trim_end_matches('.'));
         match key {
             "noise" => self.deviation = Some(value.parse().map_err(bad)?),
             "timer" => self.timer = Some(quantity::duration(value).map_err(bad)?),
@@ -161,7 +149,7 @@ impl PartialNoise {
             "speed_factor" => {
                 let speed = value.trim().parse::<f64>().ok().filter(|speed| *speed > 0.0 && speed.is_finite());
                 let example = "a number greater than 0 such as 0.98";
-                self.speed = Some(speed.ok_or_else(|| bad(ProbeProblem::BadQuantity { text: value.into(), example }))?);
+                self.speed = Some(speed.ok_or_else(|| wrong(key, value, example))?);
             }
             "speed_error" => self.speed_error = Some(quantity::share(value).map_err(bad)?),
             "speed_bias" => self.speed_bias = Some(quantity::share(value).map_err(bad)?),
@@ -170,8 +158,7 @@ impl PartialNoise {
             "position" => self.position = Some(quantity::length(value).map_err(bad)?),
             _ => {
                 let example = "a length and an angle such as 1mm/1deg";
-                let parts = value.split_once('/').ok_or(ProbeProblem::BadQuantity { text: value.into(), example });
-                let (moved, turned) = parts.map_err(bad)?;
+                let (moved, turned) = value.split_once('/').ok_or_else(|| wrong(key, value, example))?;
                 self.drift = Some([quantity::length(moved).map_err(bad)?, quantity::angle(turned).map_err(bad)?]);
             }
         }
@@ -179,29 +166,26 @@ impl PartialNoise {
         match self.over(Noise::default()).check() {
             Ok(()) => Ok(()),
             Err(error) => {
-                let wanted = match error.kind() {
-                    Kind::Setting { allowed, .. } => allowed.clone(),
-                    _ => error.to_string(),
-                };
-                Err(BadNoise { key: key.into(), value: value.into(), wanted })
+                let Kind::Setting { allowed, .. } = error.kind() else { return Err(error) };
+                Err(wrong(key, value, allowed))
             }
         }
     }
 }
 
 /// One value for all fingers, or one for each with slashes between them.
-fn each(text: &str, read: impl Fn(&str) -> Result<f64, ProbeProblem>) -> Result<[f64; FINGERS], ProbeProblem> {
+fn each(text: &str, read: impl Fn(&str) -> Result<f64>) -> Result<[f64; FINGERS]> {
     let example = "one value for all fingers, or one for each such as 1%/2%/0% or 3ms/0ms/-1ms";
-    let values = text.split('/').map(read).collect::<Result<Vec<f64>, _>>()?;
+    let values = text.split('/').map(read).collect::<Result<Vec<f64>>>()?;
     match values[..] {
         [one] => Ok([one; FINGERS]),
         [first, second, third] => Ok([first, second, third]),
-        _ => Err(ProbeProblem::BadQuantity { text: text.into(), example }),
+        _ => Err(quantity::bad(text, example)),
     }
 }
 
 /// A duration that may be negative.
-fn signed(text: &str) -> Result<f64, ProbeProblem> {
+fn signed(text: &str) -> Result<f64> {
     match text.trim().strip_prefix('-') {
         Some(late) => quantity::duration(late).map(|late| -late),
         None => quantity::duration(text),
@@ -209,27 +193,26 @@ fn signed(text: &str) -> Result<f64, ProbeProblem> {
 }
 
 impl FromStr for PartialNoise {
-    type Err = BadNoise;
+    type Err = Error;
 
-    fn from_str(text: &str) -> Result<Self, BadNoise> {
+    fn from_str(text: &str) -> Result<Self> {
         let mut noise = Self::default();
         for (index, part) in text.split(',').enumerate() {
             if index == 0 && part.trim() == "none" {
                 noise = Noise::default().into();
                 continue;
             }
-            let whole = |wanted: String| BadNoise { key: "real".into(), value: part.trim().into(), wanted };
+            let whole = |wanted: &str| wrong("real", part.trim(), wanted);
             let Some((key, value)) = part.split_once('=') else {
-                let wanted = "settings such as noise=0..5ms,timer=1ms,missed=2%, or none".to_owned();
-                return Err(whole(wanted));
+                return Err(whole("settings such as noise=0..5ms,timer=1ms,missed=2%, or none"));
             };
             let key = key.trim().replace('-', "_");
             let Some(key) = Self::KEYS.into_iter().find(|known| *known == key) else {
-                return Err(whole(format!("one of {}", Self::KEYS.join(", "))));
+                return Err(whole(&format!("one of {}", Self::KEYS.join(", "))));
             };
             let earlier = text.split(',').take(index).filter_map(|part| part.split_once('='));
             if earlier.into_iter().any(|(earlier, _)| earlier.trim().replace('-', "_") == key) {
-                return Err(BadNoise { key: key.into(), value: value.into(), wanted: "each key once".into() });
+                return Err(wrong(key, value, "each key once"));
             }
             noise.set(key, value.trim())?;
         }
