@@ -45,8 +45,7 @@ pub fn weights(weights: &[f64]) -> Result<Vec<u32>> {
 /// Compiles an ensemble. The model states the ensemble's own probe, or the published one where the ensemble states none.
 ///
 /// # Errors
-/// Errors of [`palpate_trees::compile::compile`]; [`EnsembleProblem::Attribute`](crate::error::EnsembleProblem::Attribute) if the
-/// ensemble states something of its touches that cannot be read.
+/// Errors of [`palpate_trees::compile::compile`], and if the ensemble states something of its touches that cannot be read.
 pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
     trees::compile(ensemble, &stated(ensemble, settings)?)
 }

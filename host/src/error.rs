@@ -13,4 +13,3 @@ pub use crate::locate::error::*;
 pub use crate::teach::error::*;
 pub use crate::touches::error::*;
 pub use palpate_simulator::error::*;
-pub use palpate_trees::error::*;

@@ -84,6 +84,10 @@ pub enum Kind {
     Cancelled,
     /// Standard output was closed by its reader (`palpate … | head`): not an error for the user.
     Closed,
+    /// Margins of a library do not belong to the rows or the outputs of the model that is compared with them.
+    Margins,
+    /// Predictions of a library do not belong to the rows or the outputs of the model that is compared with them.
+    Predictions,
 }
 
 /// A problem as a value: where it is, what is wrong, what to do. It is made where it arises:

@@ -141,7 +141,7 @@ impl Ensemble {
         let trees = trees.into_iter().map(tree).collect::<PyResult<_>>()?;
         let parts =
             Parts { kind, features, names: Vec::new(), base, trees, notes, prediction, probability, compares_f64 };
-        Ok(py.detach(|| parts.into_ensemble(names.as_deref())).map_err(Error::from)?.into())
+        Ok(py.detach(|| parts.into_ensemble(names.as_deref()))?.into())
     }
 
     /// The feature and the threshold of each split, and whether a value that equals it goes left.

@@ -9,7 +9,7 @@ use crate::objects;
 use numpy::ndarray::Ix2;
 use palpate::compile::{self as library, Compiled, CompiledModel, Language, Leaf, Settings};
 use palpate::ensemble::Probability;
-use palpate::error::{CompileProblem, Error, EvaluateProblem, TouchesProblem};
+use palpate::error::{Error, EvaluateProblem, TouchesProblem};
 use palpate::evaluate::Candidate;
 use palpate::evaluate::predict::{Predicted, predict};
 use palpate::evaluate::together::{AT_ONCE, Together, TouchesTogether};
@@ -55,9 +55,7 @@ pub(crate) struct Model {
 
 impl Model {
     pub(crate) fn of(bytes: Vec<u8>) -> palpate::Result<Self> {
-        let opened = OpenedModel::try_new(bytes, |bytes| {
-            onboard::Model::new(bytes).map_err(|error| Error::from(CompileProblem::Model(error)))
-        })?;
+        let opened = OpenedModel::try_new(bytes, |bytes| library::open(bytes))?;
         let encoder = Encoder::of(opened.borrow_dependent());
         let features = Features::from(opened.borrow_dependent());
         Ok(Self { opened: Arc::new(opened), encoder, features, notes: Vec::new(), labels: None, source: None })

@@ -8,7 +8,7 @@ use crate::work::{Callback, long};
 use numpy::ndarray::Ix2;
 use palpate::calibrate::Per;
 use palpate::compile;
-use palpate::error::{Error, RowsProblem};
+use palpate::error::Error;
 use palpate::rows::{Features, RowOf, Sequences, SequencesBuilder};
 use palpate::strangers;
 use palpate::stream::{self, Learned, Settings, StrangerTest, Wanted};
@@ -40,11 +40,9 @@ fn sequences(
         let of = |texts: &'_ [String]| texts.get(number).map(String::as_str).unwrap_or_default().to_owned();
         let (label, group) = (labels.map_or_else(|| "0".into(), of), groups.map(of));
         let own = RowOf { label: &label, sequence: &ids[number], group: group.as_deref() };
-        builder
-            .push(row, own)
-            .map_err(|problem| Error::from(RowsProblem::InRow { row: number + 1, problem: Box::new(problem) }))?;
+        builder.push(row, own).map_err(|error| error.within(format_args!("row {}: ", number + 1)))?;
     }
-    Ok(builder.finish().map_err(Error::from)?)
+    Ok(builder.finish()?)
 }
 
 /// A fold of a training: a model that was trained without it, its rows, labels, sequences and groups.

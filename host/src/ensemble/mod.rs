@@ -23,8 +23,7 @@ use std::path::Path;
 /// Reads an ensemble, over touches or over rows, and checks its statements about touches.
 ///
 /// # Errors
-/// Errors of [`Ensemble::load`]; [`EnsembleProblem::Attribute`] for statements that this
-/// crate did not write.
+/// Errors of [`Ensemble::load`], and for statements that this crate did not write.
 pub fn load(path: impl AsRef<Path>) -> Result<Ensemble> {
     load_with(path, &Options::default())
 }
@@ -48,6 +47,6 @@ pub fn read(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ensemble
 
 /// An ensemble that was read from `path`, if what it states of its touches can be read.
 fn checked(path: &Path, ensemble: Ensemble) -> Result<Ensemble> {
-    TouchOrigin::of(&ensemble.origin).map_err(|problem| crate::Error::from(problem).in_file(path))?;
+    TouchOrigin::of(&ensemble.origin).map_err(|error| error.in_file(path))?;
     Ok(ensemble)
 }

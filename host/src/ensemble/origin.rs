@@ -1,7 +1,7 @@
 //! Origin of the touches that an ensemble was trained on.
 
 use super::{Provenance, Trained};
-use crate::error::{EnsembleProblem, Error, Result, problem};
+use crate::error::{Error, Result, problem};
 use crate::probe::approach::Probe;
 use crate::probe::hand;
 use crate::probe::noise::Noise;
@@ -42,15 +42,15 @@ impl TouchOrigin {
     /// Statements of `origin`.
     ///
     /// # Errors
-    /// [`EnsembleProblem::Attribute`] for an attribute that is not what this crate writes.
-    pub fn of(origin: &Provenance) -> Result<Self, EnsembleProblem> {
+    /// For an attribute that is not what this crate writes.
+    pub fn of(origin: &Provenance) -> Result<Self> {
         let attributes = &origin.attributes;
-        let numbers = |name: &'static str| -> Result<BTreeMap<String, u64>, EnsembleProblem> {
+        let numbers = |name: &'static str| -> Result<BTreeMap<String, u64>> {
             let expected = "a JSON object of hexadecimal numbers";
             let read: Option<BTreeMap<String, String>> = parsed(attributes, name, expected)?;
             let number = |(object, text): (String, String)| match u64::from_str_radix(&text, 16) {
                 Ok(number) => Ok((object, number)),
-                Err(error) => Err(EnsembleProblem::Attribute { name, expected, detail: error.to_string() }),
+                Err(error) => Err(wrong_attribute(name, expected, error)),
             };
             read.into_iter().flatten().map(number).collect()
         };
@@ -411,7 +411,7 @@ fn short(fingerprint: u64) -> u16 {
 }
 
 /// The touches that an ensemble states to be trained on.
-pub(super) fn trained(origin: &Provenance) -> Result<Option<Trained>, EnsembleProblem> {
+pub(super) fn trained(origin: &Provenance) -> Result<Option<Trained>> {
     let expected = "a JSON object of counted, patterns, needs_pose and largest_spread";
     parsed(&origin.attributes, TouchOrigin::TRAINED, expected)
 }
@@ -419,12 +419,16 @@ pub(super) fn trained(origin: &Provenance) -> Result<Option<Trained>, EnsemblePr
 /// An attribute, read as JSON.
 fn parsed<T: for<'t> Deserialize<'t>>(
     attributes: &BTreeMap<String, String>,
-    name: &'static str,
-    expected: &'static str,
-) -> Result<Option<T>, EnsembleProblem> {
+    name: &str,
+    expected: &str,
+) -> Result<Option<T>> {
     let Some(text) = attributes.get(name) else { return Ok(None) };
-    let refused = |error: serde_json::Error| EnsembleProblem::Attribute { name, expected, detail: error.to_string() };
-    serde_json::from_str(text).map(Some).map_err(refused)
+    serde_json::from_str(text).map(Some).map_err(|error| wrong_attribute(name, expected, error))
+}
+
+/// An attribute that this crate did not write.
+fn wrong_attribute(name: &str, expected: &str, detail: impl std::fmt::Display) -> Error {
+    problem!("{name} is not {expected}: {detail}").fix("Correct the attribute, or remove it.")
 }
 
 /// A CRC-64 (XZ) of the contact times of each object's first touches.

@@ -24,7 +24,7 @@ use palpate_trees::rows::{RowSequence, Sequences};
 ///
 /// # Errors
 /// [`CalibrateProblem`], if no threshold keeps the promise, too few names are given to know, or there are too few sequences;
-/// [`RowsProblem`](crate::error::RowsProblem) for a model without classes of rows; [`Kind::Setting`](crate::error::Kind::Setting) for
+/// For a model without classes of rows; [`Kind::Setting`](crate::error::Kind::Setting) for
 /// settings out of their ranges.
 pub fn calibrate(
     model: &Model<'_>,

@@ -134,7 +134,7 @@ pub struct Grown {
 /// Measures a model on sequences of rows.
 ///
 /// # Errors
-/// [`RowsProblem`](crate::error::RowsProblem) for a model without classes of rows, and for rows of another number of features;
+/// For a model without classes of rows, and for rows of another number of features;
 /// [`Kind::Setting`](crate::error::Kind::Setting) for settings out of their ranges.
 pub fn evaluate(model: &Model<'_>, sequences: &Sequences, wanted: &Wanted) -> Result<Evaluated> {
     let rows = taken(model, sequences)?;

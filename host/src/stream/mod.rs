@@ -40,7 +40,7 @@ pub use settings::Settings;
 #[cfg(feature = "train")]
 pub use settings::StrangerTest;
 
-use crate::error::{EvaluateProblem, Result, RowsProblem};
+use crate::error::{EvaluateProblem, Result, problem};
 use crate::evaluate::together::units_of_rows;
 use palpate_onboard::{Model, Refused, RowsSeen};
 use palpate_shared::format::Position;
@@ -75,15 +75,14 @@ fn rows_of(sequences: &Sequences) -> usize {
 
 /// Refuses rows of another number of measured features.
 fn check_columns(model: &Model<'_>, sequences: &Sequences) -> Result<()> {
-    let (found, wanted) = (sequences.features, model.measured_count());
-    if found == wanted { Ok(()) } else { Err(RowsProblem::Columns { found, wanted, all: None }.into()) }
+    crate::rows::check_columns(sequences.features, model.measured_count())
 }
 
 /// Sequences as a recognizer takes them: with the number of each row, if the model has a [position](Model::position), and
 /// without the rows that its [guard](Model::guard) refuses.
 ///
 /// # Errors
-/// Errors of [`check`]; [`RowsProblem::Columns`] for rows of another number of measured features.
+/// Errors of [`check`], and for rows of another number of measured features.
 fn taken<'s>(model: &Model<'_>, sequences: &'s Sequences) -> Result<Cow<'s, Sequences>> {
     check(model)?;
     check_columns(model, sequences)?;
@@ -128,13 +127,17 @@ impl<'r> Rows<'r> {
 /// Refuses a model that has no classes of rows.
 ///
 /// # Errors
-/// [`EvaluateProblem::OverTouches`] and [`RowsProblem::Regression`].
+/// [`EvaluateProblem::OverTouches`], and for a model of one output.
 pub fn check(model: &Model<'_>) -> Result<()> {
     if model.descriptor().is_some() {
         return Err(EvaluateProblem::OverTouches.into());
     }
     if model.known_count() < 2 {
-        return Err(RowsProblem::Regression { output: model.object_name(0).into() }.into());
+        return Err(problem!(
+            "the model predicts a value ({}), and not classes: its rows are no evidence for any",
+            model.object_name(0)
+        )
+        .fix("Give a model of two or more classes."));
     }
     Ok(())
 }

@@ -86,7 +86,7 @@ impl StrangerTest {
     /// A test with a background of these sequences, whose classes do not matter.
     ///
     /// # Errors
-    /// [`RowsProblem`](crate::error::RowsProblem) for a model without classes of rows, and for rows of another number of features.
+    /// For a model without classes of rows, and for rows of another number of features.
     pub fn new(settings: strangers::Settings, model: &Model<'_>, others: Option<&Sequences>) -> Result<Self> {
         let Some(others) = others else { return Ok(Self { settings, background: Vec::new() }) };
         let others = taken(model, others)?;

@@ -12,6 +12,7 @@
 //! | [`verify`] | margins, predictions and scores over rows; a model compared with its ensemble | [`verify::verify`](fn@verify::verify) |
 //! | [`prove`] | a model means what its ensemble means, for every row: proofs | [`prove::prove`](fn@prove::prove) |
 //! | [`train`] | grows boosted trees on rows of classes | [`train::train`] |
+//! | [`error`] | errors, with the place and a remedy | |
 //! | [`output`], [`progress`] | files that appear whole or not at all; progress of long calls | |
 //! | [`wording`] | numbers as people read them | [`wording::decimal`] |
 //!
@@ -20,13 +21,12 @@
 
 pub mod compile;
 pub mod ensemble;
-pub mod error;
 pub mod prove;
 pub mod rows;
 pub mod train;
 pub mod verify;
 
 pub use error::{Error, Result};
-pub use palpate_base::{output, progress, wording};
+pub use palpate_base::{error, output, progress, wording};
 pub use palpate_onboard as onboard;
 pub use palpate_shared as shared;

@@ -9,7 +9,7 @@ use super::sequences::{self, Evaluation, SequenceArguments};
 use super::table::{self, TableArguments};
 use palpate::calibrate::{Per, Terms};
 use palpate::ensemble::OverTouches;
-use palpate::error::{EvaluateProblem, RowsProblem};
+use palpate::error::EvaluateProblem;
 use palpate::evaluate::model_file::ModelFile;
 use palpate::evaluate::{self, Classes, Evaluated, Regression, RowsEvaluation, Wanted, evaluate_rows};
 use palpate::output;
@@ -192,10 +192,7 @@ fn rows(directory: &Path, arguments: &Arguments, file: &ModelFile, label: &str, 
         ModelFile::Compiled(compiled) => Features::from(&compiled.model()),
     };
     let rows = super::rows::read_rows(directory, features, Some(label))?;
-    let evaluated = file.with(|candidate| evaluate_rows(candidate, &rows)).map_err(|error| match error.problem() {
-        Some(RowsProblem::Label { .. }) => error.in_file(directory),
-        _ => error.in_file(&arguments.model),
-    })?;
+    let evaluated = file.with(|candidate| evaluate_rows(candidate, &rows)).map_err(|error| error.in_file(directory))?;
     if global.json {
         return output::print_json(&evaluated);
     }

@@ -2,7 +2,7 @@
 
 use super::rows::read_rows;
 use palpate::Result;
-use palpate::error::{Error, EvaluateProblem, Place, RowsProblem};
+use palpate::error::EvaluateProblem;
 use palpate::evaluate::verify::margins;
 use palpate::output;
 use palpate::rows::{Encoder, Features, RowOf, SequencesBuilder};
@@ -83,7 +83,7 @@ pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, asked: &Asked<'_
     let path = if path.as_os_str() == "-" { Path::new("/dev/stdin") } else { path };
     let features = if adds_up { Features::measured(&model) } else { Features::from(&model) };
     let rows = read_rows(path, features, sequence)?;
-    let starts = starts(&rows.labels).map_err(|problem| Error::variant_at(Place::file(path), problem))?;
+    let starts = starts(&rows.labels).map_err(|error| error.in_file(path))?;
     if let Some(promise) = model.promise().filter(|_| adds_up && sequence.is_none()) {
         super::remark(&format!(
             "palpate: note: {}: nothing says where a sequence ends (--sequence-column), so the promise of {} % is for the first \
@@ -141,12 +141,12 @@ pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, asked: &Asked<'_
 }
 
 /// The rows with which sequences begin, of the sequences' names.
-fn starts(ids: &[String]) -> Result<BTreeSet<usize>, RowsProblem> {
+fn starts(ids: &[String]) -> Result<BTreeSet<usize>> {
     let mut sequences = SequencesBuilder::new(1, &[String::new()]);
     for (number, id) in ids.iter().enumerate() {
         sequences
             .push(&[0.0], RowOf { label: "", sequence: id, group: None })
-            .map_err(|problem| RowsProblem::InRow { row: number + 1, problem: Box::new(problem) })?;
+            .map_err(|error| error.within(format_args!("row {}: ", number + 1)))?;
     }
     let sequences = sequences.finish().map_or_else(|_| Vec::new(), |built| built.sequences);
     Ok(sequences.into_iter().map(|sequence| sequence.rows.start).collect())

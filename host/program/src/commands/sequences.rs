@@ -4,7 +4,7 @@ use super::Global;
 use super::figures::shares_table;
 use palpate::Result;
 use palpate::compile::{self, CompiledModel};
-use palpate::error::{Error, Place, RowsProblem};
+use palpate::error::{Error, Place, problem};
 use palpate::evaluate::Finding;
 use palpate::output;
 use palpate::rows::{Features, SequenceColumns, Sequences};
@@ -165,5 +165,7 @@ fn evaluated_text(evaluated: &Evaluated) -> String {
 
 /// Refuses sequences of an ensemble: only a compiled model stops.
 pub(crate) fn needs_compiled(path: &Path) -> Error {
-    Error::variant_at(Place::file(path), RowsProblem::NotCompiled)
+    problem!("an ensemble has no thresholds to stop at")
+        .fix("Compile it with `palpate export`, and give the model.")
+        .at(Place::file(path))
 }

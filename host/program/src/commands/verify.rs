@@ -4,7 +4,7 @@ use super::unstated::UnstatedArguments;
 use palpate::Result;
 use palpate::compile::CompiledModel;
 use palpate::ensemble::{self, OverTouches};
-use palpate::error::{Error, EvaluateProblem, Place, RowsProblem};
+use palpate::error::{Error, EvaluateProblem, Kind, Place};
 use palpate::evaluate::verify::{Library, Verified, verify};
 use palpate::rows::{read_margins, read_values};
 use palpate::wording::{count, scientific};
@@ -76,16 +76,16 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let margins = arguments.library_margins.as_deref().map(read_margins).transpose()?;
     let values = arguments.library_values.as_deref().map(read_values).transpose()?;
     let place = |error: Error| {
-        let file = match error.problem() {
-            Some(problem) if RowsProblem::is_about_margins(problem) => arguments.library_margins.as_ref(),
-            Some(problem) if RowsProblem::is_about_values(problem) => arguments.library_values.as_ref(),
+        let file = match error.kind() {
+            Kind::Margins => arguments.library_margins.as_ref(),
+            Kind::Predictions => arguments.library_values.as_ref(),
             _ => None,
         };
         error.in_file(file.unwrap_or(&arguments.model))
     };
     let library = Library { margins: margins.as_deref(), values: values.as_deref() };
     let verified = verify(&compiled.model(), &ensemble, &rows, library, &Bar::new()).map_err(place)?;
-    let checked = verified.check().map_err(|problem| Error::variant_at(Place::file(&arguments.model), problem));
+    let checked = verified.check().map_err(|error| error.in_file(&arguments.model));
     if arguments.prove && checked.is_ok() {
         let verified = Some((&verified, text(&verified)));
         return super::prove::run(&arguments.model, &arguments.ensemble, verified, &options, global);

@@ -11,7 +11,7 @@
 use crate::ensemble::{
     Ensemble, MAX_OBJECTS, Node, Provenance, StatedProbe, TouchOrigin, Trained, check_names, feature_row, inputs,
 };
-use crate::error::{Error, Result, TrainProblem};
+use crate::error::{Error, Kind, Result, TrainProblem};
 use crate::mesh::BACKGROUND;
 use crate::probe::noise::Noise;
 use crate::progress::Progress;
@@ -312,9 +312,9 @@ fn with_palpate(
         if progress.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
     let trained = boost::train(rows.lent(), objects.len(), parameters, settings.threads, &on_round);
-    let (base_margins, trees) = trained.map_err(|failure| match failure {
-        boost::Failure::Cancelled => Error::cancelled(),
-        refused => TrainProblem::Trainer { trainer: "palpate", detail: refused.to_string() }.into(),
+    let (base_margins, trees) = trained.map_err(|error| match error.kind() {
+        Kind::Cancelled => error,
+        _ => TrainProblem::Trainer { trainer: "palpate", detail: error.to_string() }.into(),
     })?;
     Ok(Ensemble { inputs: inputs(settings.descriptor), objects, base_margins, trees, origin: Provenance::default() })
 }

@@ -1,6 +1,6 @@
 //! The file of a model around its content: header, text, optional sections, checksum. The content here is trees.
 
-use crate::error::{CompileProblem, Error, Result};
+use crate::error::{Error, Result, problem};
 use palpate_onboard::Model;
 use palpate_shared::format::{CHECKSUM_LENGTH, HEADER_LENGTH, HeaderBuilder, Section, Tag, checksum};
 
@@ -56,7 +56,7 @@ impl Container {
     /// The file's bytes.
     ///
     /// # Errors
-    /// [`CompileProblem::TooLarge`](crate::error::CompileProblem::TooLarge) for more than 4 GB.
+    /// For more than 4 GB.
     pub(super) fn bytes(mut self) -> Result<Vec<u8>> {
         self.sections.sort_by_key(|section| section.tag);
         let sections = bytes_of(&self.sections);
@@ -75,7 +75,7 @@ impl Container {
 /// The file of a model whose content is no trees, such as maps: margins and priors are 0.
 ///
 /// # Errors
-/// [`CompileProblem::TooLarge`](crate::error::CompileProblem::TooLarge) for more than 4 GB.
+/// For more than 4 GB.
 pub fn file(header: HeaderBuilder, text: Vec<u8>, sections: Vec<OwnedSection>, content: Vec<u8>) -> Result<Vec<u8>> {
     Container { header, text, sections, content }.bytes()
 }
@@ -95,7 +95,10 @@ pub(super) fn count(number: usize) -> Result<u32> {
     u32::try_from(number).map_err(|_| too_large())
 }
 
+/// Advice on ensembles that are too large.
+pub(super) const FEWER_SPLITS: &str = "Train fewer trees, or trees with fewer splits.";
+
 /// Error of a model with more of something than its field can count.
 pub(super) fn too_large() -> Error {
-    CompileProblem::TooLarge.into()
+    problem!("the ensemble is too large for the model format").fix(FEWER_SPLITS)
 }

@@ -1,7 +1,9 @@
 //! An ensemble that was checked, with thresholds as the integers that the chip compares.
 
-use crate::ensemble::{Ensemble, Inputs, MAX_FEATURES, MAX_OBJECTS, Node, Output, Schema, Threshold, Tree, check_leaf};
-use crate::error::{CompileProblem, Error, Result, TreeProblem};
+use crate::ensemble::{
+    Ensemble, Inputs, MAX_FEATURES, MAX_OBJECTS, Node, Output, Schema, Threshold, Tree, check_leaf, faults,
+};
+use crate::error::{Error, Result, problem};
 use palpate_shared::format::{Key, f32_key};
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -54,22 +56,28 @@ impl<'a> Forest<'a> {
         let objects = ensemble.objects.len();
         let base_margins = ensemble.base_margins.len();
         if !(1..=MAX_OBJECTS).contains(&objects) || base_margins != objects {
-            return Err(CompileProblem::Objects { objects, base_margins }.into());
+            return Err(problem!("cannot compile an ensemble of {objects} objects and {base_margins} base margins")
+                .fix("Give 1 to 256 objects, and one base margin for each."));
         }
         let features = ensemble.inputs.count();
         if !(1..=MAX_FEATURES).contains(&features) {
-            return Err(CompileProblem::Features { features, most: MAX_FEATURES }.into());
+            return Err(problem!(
+                "cannot compile an ensemble over {features} features, which is not 1 to {MAX_FEATURES}"
+            )
+            .fix(format!("Train on the features that matter, at most {MAX_FEATURES}.")));
         }
         let thresholds = Thresholds::new(&ensemble.inputs, scales)?;
         thresholds.check_range(ensemble)?;
         let mut trees = Vec::with_capacity(ensemble.trees.len());
         for (index, tree) in ensemble.trees.iter().enumerate() {
-            let place = |problem| CompileProblem::Tree { tree: index, problem };
+            let place = |error: Error| {
+                error
+                    .within(format_args!("cannot compile the ensemble: tree {index}: "))
+                    .fix("Train it again, or check the program that wrote it.")
+            };
             let values = match tree.output {
                 Output::One(object) if object < objects => 1,
-                Output::One(object) => {
-                    return Err(place(TreeProblem::Object { object: object as u64, objects }).into());
-                }
+                Output::One(object) => return Err(place(faults::object(object, objects))),
                 Output::Each => objects,
             };
             let own = |node| ensemble.threshold(index, node);
@@ -136,8 +144,15 @@ impl<'a> Forest<'a> {
             if range.is_nan() || range > MARGIN_RANGE {
                 let largest = self.trees.iter().map(|tree| tree.largest).fold(self.base[object].abs(), f32::max);
                 let kind = if self.schema.is_some() { "object" } else { "class" };
-                let of = format!("the {kind} {}", self.names.get(object).map_or("", String::as_str));
-                return Err(CompileProblem::MarginRange { of, range, largest, most: MARGIN_RANGE }.into());
+                let name = self.names.get(object).map_or("", String::as_str);
+                return Err(problem!(
+                    "cannot compile the ensemble: the margin of the {kind} {name} can reach {range:e} (the largest single \
+                     value is {largest:e}), beyond the {MARGIN_RANGE} that a model can hold"
+                )
+                .fix(
+                    "Margins are log-probabilities, and a few dozen nats already mean certainty: train it again, or check \
+                     the program that wrote it.",
+                ));
             }
         }
         Ok(())
@@ -176,13 +191,13 @@ struct Reader<'a, 'r> {
 
 impl<'a> Reader<'a, '_> {
     /// A branch and its splits.
-    fn branch(&mut self, index: usize, depth: usize) -> Result<(Branch<'a>, usize), TreeProblem> {
+    fn branch(&mut self, index: usize, depth: usize) -> Result<(Branch<'a>, usize)> {
         if depth > MAX_DEPTH {
-            return Err(TreeProblem::TooDeep { most: MAX_DEPTH });
+            return Err(problem!("it is deeper than {MAX_DEPTH} splits"));
         }
         let nodes = self.tree.nodes.len();
-        let node = self.tree.nodes.get(index).ok_or(TreeProblem::NoNodes)?;
-        self.left = self.left.checked_sub(1).ok_or(TreeProblem::ReachedTwice { node: index })?;
+        let node = self.tree.nodes.get(index).ok_or_else(faults::no_nodes)?;
+        self.left = self.left.checked_sub(1).ok_or_else(|| faults::reached_twice(index))?;
         match node {
             Node::Leaf(values) => {
                 check_leaf(index, values, self.values)?;
@@ -192,14 +207,13 @@ impl<'a> Reader<'a, '_> {
             &Node::Split { feature, threshold, missing_left, left, right } => {
                 let features = self.features;
                 let number = u8::try_from(feature).ok().filter(|_| feature < features);
-                let number = number.ok_or(TreeProblem::Feature { node: index, feature: feature as u64, features })?;
+                let number = number.ok_or_else(|| faults::feature(index, feature, features))?;
                 if threshold.is_nan() {
-                    return Err(TreeProblem::Threshold { node: index, threshold });
+                    return Err(faults::threshold(index, threshold));
                 }
                 for (side, child) in [("left", left), ("right", right)] {
                     if child >= nodes {
-                        let child = i64::try_from(child).unwrap_or(i64::MAX);
-                        return Err(TreeProblem::Child { node: index, side, child, nodes });
+                        return Err(faults::child(index, side, child, nodes));
                     }
                 }
                 let (left, left_splits) = self.branch(left, depth + 1)?;
@@ -327,8 +341,14 @@ fn check_thresholds(ensemble: &Ensemble, schema: &Schema) -> Result<()> {
             let rounded = whole.collect::<BTreeSet<_>>().len();
             let thresholds = thresholds.len();
             let Schema { of, whole, units, .. } = *schema;
-            let problem = CompileProblem::Thresholds { feature: name, thresholds, rounded, example, of, whole, units };
-            return Err(problem.into());
+            return Err(problem!(
+                "the ensemble was not trained on whole numbers: the threshold {example} of {name} is neither whole nor \
+                 halfway between two, and of {thresholds} thresholds {rounded} stay different when rounded to {whole}"
+            )
+            .fix(format!(
+                "Train on features in whole units: {units}. If it is not a model of {of}, remove its attribute \
+                 palpate_descriptor: then its features are compared as they are."
+            )));
         }
     }
     Ok(())

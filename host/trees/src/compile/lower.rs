@@ -1,7 +1,7 @@
 //! Lowers a forest, and writes it in preorder.
 
 use super::axes::{Axes, visit};
-use super::error::CompileProblem;
+use super::container::too_large;
 use super::forest::Forest;
 use super::lowered::Lowered;
 use super::merge::{Merged, Source, merge};
@@ -9,6 +9,7 @@ use super::parts::Parts;
 use super::quantize::Scale;
 use super::share::share;
 use super::trees::{self, Leaves, Sections};
+use crate::error::{Result, problem};
 use palpate_shared::format::{Layout, LeafType};
 
 /// The most different thresholds: two bytes number them.
@@ -33,15 +34,16 @@ impl<'f> Lowered<'f> {
     /// The layout that numbers the trees' columns, thresholds and splits.
     ///
     /// # Errors
-    /// [`CompileProblem`] that says of what there is too much.
-    pub(super) fn layout(&self) -> Result<Layout, CompileProblem> {
+    /// Names what there is too much of.
+    pub(super) fn layout(&self) -> Result<Layout> {
         let trees = &self.forest.trees;
         let splits = trees.iter().map(|tree| tree.splits).max().unwrap_or_default();
         if u16::try_from(splits).is_err() {
-            return Err(CompileProblem::TooManySplits { splits });
+            return Err(problem!("the ensemble has a tree with {splits} splits, and a model's can have 65,535")
+                .fix("Train with fewer leaves in a tree."));
         }
         if u16::try_from(self.runs.len()).is_err() {
-            return Err(CompileProblem::TooLarge);
+            return Err(too_large());
         }
         // Columns and left subtrees are numbered in a byte.
         let mut is_narrow = self.axes.columns <= 256;
@@ -53,7 +55,10 @@ impl<'f> Lowered<'f> {
         if thresholds <= MAX_THRESHOLDS {
             Ok(Layout::Wide)
         } else {
-            Err(CompileProblem::TooManyThresholds { thresholds })
+            Err(problem!("the ensemble has {thresholds} different thresholds, and a model can have 65,536").fix(
+                "Round the features to the sensor's resolution before training, or compare whole numbers (`export --scale`, \
+                 in Python `scales`), which makes thresholds equal; or train fewer trees. Splits may be as many.",
+            ))
         }
     }
 

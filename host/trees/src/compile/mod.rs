@@ -43,7 +43,6 @@ pub mod code;
 mod container;
 mod cost;
 mod emit;
-mod error;
 mod forest;
 mod groups;
 mod legend;
@@ -65,7 +64,6 @@ pub use budget::compile_within;
 pub use container::{OwnedSection, file};
 pub use cost::{Core, FEATURES, Instructions, Memory, code_flash, features};
 pub use emit::{HEADER, Language, NO_CODE, check_place, emit, identifier, write_sources};
-pub use error::CompileProblem;
 pub use legend::label_numbers;
 pub(crate) use merge::Source;
 pub use model::{CompiledModel, bound_of, names, open, thresholds};
@@ -74,7 +72,7 @@ pub use restate::{Restated, RestatedSection, restate};
 pub use share::different_leaves;
 
 use crate::ensemble::{Ensemble, Probability};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, problem};
 use cells::Cells;
 use code::{Program, Statements};
 use forest::Forest;
@@ -184,7 +182,7 @@ pub fn stopping(error_rate: f64, max_touches: u32) -> Result<Stopping> {
 /// Compiles an ensemble.
 ///
 /// # Errors
-/// [`CompileProblem`] for an ensemble that contradicts itself, has leaves that are not finite or too large, thresholds
+/// For an ensemble that contradicts itself, has leaves that are not finite or too large, thresholds
 /// that fall together when rounded to whole numbers, more of something than the format can count, or that no code can be
 /// written of, if that is asked for; [`Kind::Setting`](crate::error::Kind::Setting) for settings out of their ranges.
 pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
@@ -200,7 +198,13 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
     let scale = f64::from(ensemble.prediction().scale);
     let margin_error = rounding::round_up(f64::from(trees_error) + rounding);
     let (layout, parts, code) = if settings.code {
-        let program = Program::new(&lowered, &stated(ensemble, settings)).ok_or(CompileProblem::NoCode)?;
+        let program = Program::new(&lowered, &stated(ensemble, settings)).ok_or_else(|| {
+            problem!(
+                "the ensemble cannot become code: its leaves are f32 or beyond two bytes, or it has more thresholds than 256 \
+                 columns hold"
+            )
+            .fix("Choose leaves of i16 or i8, or a model with its trees.")
+        })?;
         let parts = Parts { base: vec![0; forest.objects()], unit: lowered.scale.unit, ..Parts::default() };
         (Layout::Code, parts, Some(program))
     } else {
@@ -228,8 +232,11 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
 
 /// A forest lowered for leaves of one type.
 fn lowered<'f>(forest: &Forest<'f>, leaf: Leaf) -> Result<Lowered<'f>> {
-    let too_large = CompileProblem::LeavesTooLarge { trees: forest.trees.len(), leaf: leaf.name() };
-    Ok(Lowered::new(forest, leaf).ok_or(too_large)?)
+    Lowered::new(forest, leaf).ok_or_else(|| {
+        let (trees, leaf) = (forest.trees.len(), leaf.name());
+        problem!("margins of {trees} trees are too large for sums of {leaf} leaves")
+            .fix("Choose leaves of f32, or train fewer trees.")
+    })
 }
 
 /// Statements of the model that code depends on.

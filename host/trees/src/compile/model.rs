@@ -1,6 +1,6 @@
 //! Compiled models, opened.
 
-use crate::error::{CompileProblem, Error, Place, Result};
+use crate::error::{Error, Place, Result, problem};
 use palpate_onboard::{Model, ModelError};
 use palpate_shared::format::{Axis, HEADER_LENGTH, Header, Layout, MAGIC, MAPS_LAYOUT};
 use std::path::{Path, PathBuf};
@@ -24,8 +24,8 @@ impl CompiledModel {
     /// Reads and checks a model.
     ///
     /// # Errors
-    /// [`Kind::Io`](crate::error::Kind::Io) when the file cannot be read; [`CompileProblem::Model`] at the byte where it goes wrong when it is
-    /// not a model of this version, whole and unchanged.
+    /// [`Kind::Io`](crate::error::Kind::Io) when the file cannot be read; with the byte where it goes wrong, a file that is not a
+    /// model of this version, whole and unchanged.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let bytes = std::fs::read(path).map_err(|source| Error::io(path, "read the model", source))?;
@@ -40,11 +40,16 @@ impl CompiledModel {
         match Model::new(&bytes) {
             Ok(_) => Ok(Self { path: Some(path.into()), bytes }),
             Err(_) if bytes.starts_with(&MAGIC) && Header::of(&bytes).layout() == MAPS_LAYOUT => {
-                Err(Error::variant_at(Place::file(path), CompileProblem::Maps))
+                Err(problem!("a model of maps, not of trees")
+                    .fix(
+                        "`palpate inspect` and `recognize` take it, and `evaluate` with --objects and `calibrate` with \
+                         --objects or --recorded alone; other commands take models of trees.",
+                    )
+                    .at(Place::file(path)))
             }
             Err(error) => {
                 let offset = u64::try_from(error.offset()).unwrap_or(u64::MAX);
-                Err(Error::variant_at(Place::byte(path, offset), CompileProblem::Model(error)))
+                Err(refused(error).at(Place::byte(path, offset)))
             }
         }
     }
@@ -52,7 +57,7 @@ impl CompiledModel {
     /// Checks a model in memory.
     ///
     /// # Errors
-    /// [`CompileProblem::Model`] for bytes that are not a model of this version, whole and unchanged.
+    /// For bytes that are not a model of this version, whole and unchanged.
     pub fn from_bytes(bytes: Vec<u8>) -> Result<Self> {
         open(&bytes)?;
         Ok(Self { path: None, bytes })
@@ -88,10 +93,23 @@ impl CompiledModel {
 /// Opens the bytes of a compiled model in place, such as [`Compiled::bytes`](super::Compiled::bytes).
 ///
 /// # Errors
-/// [`CompileProblem::Model`] for bytes that are not a model of this version, whole and unchanged; none for what
+/// For bytes that are not a model of this version, whole and unchanged; none for what
 /// [`compile`](super::compile) returned.
 pub fn open(bytes: &[u8]) -> Result<Model<'_>> {
-    Model::new(bytes).map_err(|error: ModelError| CompileProblem::Model(error).into())
+    Model::new(bytes).map_err(refused)
+}
+
+/// Error of bytes that the chip's code refuses as a model.
+fn refused(error: ModelError) -> Error {
+    problem!("{error}").fix(match error {
+        ModelError::NotAModel => "Give a file that `palpate export` wrote.",
+        ModelError::Version(_) => "Export the ensemble again with this version of palpate.",
+        ModelError::Length { .. } | ModelError::Checksum { .. } => "Copy the model again, or export it again.",
+        ModelError::NeedsCode => {
+            "Trees as code can be neither proved nor inspected: export the model without --emit c-code or rust-code for that."
+        }
+        _ => "Export the model again with `palpate export`.",
+    })
 }
 
 /// Opens a model of any layout; of the layout code, whose trees are elsewhere, margins are not to be asked for.
@@ -100,7 +118,7 @@ pub(super) fn open_any(bytes: &[u8]) -> Result<Model<'_>> {
         Err(ModelError::NeedsCode) => Model::with_code(bytes, |_, _| {}),
         other => other,
     }
-    .map_err(|error| CompileProblem::Model(error).into())
+    .map_err(refused)
 }
 
 /// The names of the objects that a model knows, in its order.

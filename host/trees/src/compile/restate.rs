@@ -25,9 +25,7 @@ pub type RestatedSection = (Tag, Option<(bool, Vec<u8>)>);
 /// The bytes of `model` with what is restated. Other sections stay as they are, also those that nobody knows.
 ///
 /// # Errors
-/// [`CompileProblem::TooLarge`](crate::error::CompileProblem::TooLarge) for more than 4 GB;
-/// [`CompileProblem::Model`](crate::error::CompileProblem::Model) if the result is no model, such as with a
-/// section whose content makes no sense.
+/// For more than 4 GB; if the result is no model, such as with a section whose content makes no sense.
 pub fn restate(model: &Model<'_>, restated: &Restated) -> Result<Vec<u8>> {
     let mut container = Container::of(model);
     for (tag, section) in &restated.sections {

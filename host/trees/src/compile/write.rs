@@ -5,7 +5,7 @@ use super::container::{Container, OwnedSection, count, too_large};
 use super::forest::Forest;
 use super::parts::Parts;
 use crate::ensemble::{Ensemble, Node, Output};
-use crate::error::{CompileProblem, Error, Result};
+use crate::error::{Error, Result, problem};
 use crate::rows::whole;
 use palpate_onboard::Stopping;
 use palpate_shared::format::{
@@ -72,8 +72,7 @@ fn sections(
         for (index, name) in ensemble.inputs.names().into_iter().enumerate() {
             let scale = settings.scales.as_ref().map_or(1.0, |scales| scales[index]);
             features.extend(scale.to_le_bytes());
-            features.push(u8::try_from(name.len()).map_err(|_| CompileProblem::NameTooLong { name: name.into() })?);
-            features.extend(name.bytes());
+            put_text(&mut features, name)?;
         }
         put(Tag::FeatureNames, false, features);
     }
@@ -151,12 +150,19 @@ pub(super) fn check_sentinel(ensemble: &Ensemble, settings: &Settings) -> Result
 fn text(ensemble: &Ensemble) -> Result<Vec<u8>> {
     let mut text = Vec::new();
     for string in std::iter::once(env!("CARGO_PKG_VERSION")).chain(ensemble.objects.iter().map(String::as_str)) {
-        let length = u8::try_from(string.len()).map_err(|_| CompileProblem::NameTooLong { name: string.into() })?;
-        text.push(length);
-        text.extend(string.bytes());
+        put_text(&mut text, string)?;
     }
     text.resize(text.len().next_multiple_of(4), 0);
     Ok(text)
+}
+
+/// Appends a text with its length in a byte.
+fn put_text(bytes: &mut Vec<u8>, text: &str) -> Result<()> {
+    let length = u8::try_from(text.len())
+        .map_err(|_| problem!("the name {text:?} is too long for a model").fix("Use names of at most 255 bytes."))?;
+    bytes.push(length);
+    bytes.extend(text.bytes());
+    Ok(())
 }
 
 /// The logarithms of the priors in units, the largest 0.

@@ -1,8 +1,9 @@
 //! Checks of an ensemble that was not read from a file: a reader checks while it reads.
 
 use super::columns::MAX_NAME;
+use super::faults::{self, DAMAGED};
 use super::{Ensemble, Inputs, Node, Output, Tree};
-use crate::error::{EnsembleProblem, NameProblem, TreeProblem};
+use crate::error::{Error, Result, problem};
 use std::collections::HashSet;
 
 /// The most objects that a compiled model can distinguish.
@@ -17,7 +18,7 @@ impl Ensemble {
     ///
     /// # Errors
     /// The first thing that is wrong.
-    pub fn check(&self) -> Result<(), EnsembleProblem> {
+    pub fn check(&self) -> Result<()> {
         match &self.inputs {
             Inputs::Computed(_) => check_names(&self.objects)?,
             Inputs::Rows(features) => {
@@ -30,53 +31,49 @@ impl Ensemble {
         let objects = self.objects.len();
         let finite = self.base_margins.iter().filter(|margin| margin.is_finite()).count();
         if finite != objects || self.base_margins.len() != objects {
-            return Err(EnsembleProblem::BaseMargins { found: finite, objects });
+            return Err(problem!("it has {finite} finite base margins for {objects} objects").fix(DAMAGED));
         }
         if self.trees.is_empty() {
-            return Err(EnsembleProblem::NoTrees);
+            return Err(no_trees());
         }
         let features = self.inputs.count();
         let infinite = self.schema().is_none();
         for (number, tree) in self.trees.iter().enumerate() {
-            tree.check(features, objects, infinite)
-                .map_err(|problem| EnsembleProblem::Tree { tree: number, problem })?;
+            tree.check(features, objects, infinite).map_err(|error| error.within(format_args!("tree {number}: ")))?;
         }
         Ok(())
     }
 }
 
 impl Tree {
-    fn check(&self, features: usize, objects: usize, infinite: bool) -> Result<(), TreeProblem> {
+    fn check(&self, features: usize, objects: usize, infinite: bool) -> Result<()> {
         let nodes = self.nodes.len();
         let wanted = match self.output {
-            Output::One(object) if object >= objects => {
-                return Err(TreeProblem::Object { object: object as u64, objects });
-            }
+            Output::One(object) if object >= objects => return Err(faults::object(object, objects)),
             Output::One(_) => 1,
             Output::Each => objects,
         };
         if nodes == 0 {
-            return Err(TreeProblem::NoNodes);
+            return Err(faults::no_nodes());
         }
         let mut reached = vec![false; nodes];
         let mut waiting = vec![0];
         while let Some(node) = waiting.pop() {
             if std::mem::replace(&mut reached[node], true) {
-                return Err(TreeProblem::ReachedTwice { node });
+                return Err(faults::reached_twice(node));
             }
             match &self.nodes[node] {
                 Node::Leaf(values) => check_leaf(node, values, wanted)?,
                 &Node::Split { feature, threshold, left, right, .. } => {
                     if feature >= features {
-                        return Err(TreeProblem::Feature { node, feature: feature as u64, features });
+                        return Err(faults::feature(node, feature, features));
                     }
                     if threshold.is_nan() || !(infinite || threshold.is_finite()) {
-                        return Err(TreeProblem::Threshold { node, threshold });
+                        return Err(faults::threshold(node, threshold));
                     }
                     for (side, child) in [("right", right), ("left", left)] {
                         if child >= nodes {
-                            let child = i64::try_from(child).unwrap_or(i64::MAX);
-                            return Err(TreeProblem::Child { node, side, child, nodes });
+                            return Err(faults::child(node, side, child, nodes));
                         }
                         waiting.push(child);
                     }
@@ -88,53 +85,75 @@ impl Tree {
 }
 
 /// Returns an error unless a leaf has as many values as wanted, all of them finite.
-pub(crate) fn check_leaf(node: usize, values: &[f32], wanted: usize) -> Result<(), TreeProblem> {
+pub(crate) fn check_leaf(node: usize, values: &[f32], wanted: usize) -> Result<()> {
     if values.len() != wanted {
-        return Err(TreeProblem::LeafValues { node, found: values.len(), wanted });
+        return Err(problem!("leaf {node} has {} values instead of {wanted}", values.len()).fix(DAMAGED));
     }
     match values.iter().find(|value| !value.is_finite()) {
-        Some(&value) => Err(TreeProblem::LeafValue { node, value }),
+        Some(value) => Err(problem!("leaf {node} has the value {value}, which is not finite").fix(DAMAGED)),
         None => Ok(()),
     }
 }
 
 /// Returns an error unless these can be the names of an ensemble's features.
-fn check_features(names: &[String], ensemble: &Ensemble) -> Result<(), EnsembleProblem> {
+fn check_features(names: &[String], ensemble: &Ensemble) -> Result<()> {
     if !(1..=MAX_FEATURES).contains(&names.len()) {
         let splits = ensemble.trees.iter().flat_map(|tree| &tree.nodes).filter_map(|node| match node {
             Node::Split { feature, .. } => Some(feature),
             Node::Leaf(_) => None,
         });
         let used = splits.collect::<HashSet<_>>().len();
-        return Err(EnsembleProblem::FeatureCount { count: names.len(), used, most: MAX_FEATURES });
+        return Err(feature_count(names.len(), used));
     }
     for name in names {
         if name.len() > MAX_NAME || name.chars().any(char::is_control) {
-            return Err(EnsembleProblem::FeatureName { name: name.clone() });
+            return Err(problem!(
+                "the feature's name {name:?} is longer than {MAX_NAME} bytes or has a control character in it"
+            )
+            .fix("Give the feature a shorter name before training."));
         }
     }
     Ok(())
 }
 
+/// Advice on the names of objects.
+const NAMES: &str = "Use 2 to 256 different names of at most 255 bytes, without tabs and line ends.";
+
+/// A number of objects that no ensemble can have.
+pub(super) fn object_count(count: usize) -> Error {
+    problem!("it names {count} objects").fix(NAMES)
+}
+
+/// More features in trees than a model can have, or none at all.
+pub(super) fn feature_count(count: usize, used: usize) -> Error {
+    problem!("its trees use {used} of its {count} features, and not 1 to {MAX_FEATURES}")
+        .fix(format!("Train on the features that matter, at most {MAX_FEATURES}."))
+}
+
+/// An ensemble that adds nothing.
+pub(super) fn no_trees() -> Error {
+    problem!("it has no trees").fix(DAMAGED)
+}
+
 /// Returns an error unless these names can be an ensemble's objects.
-pub fn check_names(names: &[String]) -> Result<(), EnsembleProblem> {
+pub fn check_names(names: &[String]) -> Result<()> {
     if !(2..=MAX_OBJECTS).contains(&names.len()) {
-        return Err(EnsembleProblem::ObjectCount { count: names.len() });
+        return Err(object_count(names.len()));
     }
     let mut seen = HashSet::new();
     for name in names {
-        let why = if name.is_empty() {
-            NameProblem::Empty
+        let wrong = if name.is_empty() {
+            problem!("an object has an empty name")
         } else if name.chars().any(char::is_control) {
-            NameProblem::Control
+            problem!("the object's name {name:?} has a control character in it")
         } else if name.len() > MAX_NAME {
-            NameProblem::Long
+            problem!("the object's name {name:?} has more than {MAX_NAME} bytes")
         } else if !seen.insert(name) {
-            NameProblem::Twice
+            problem!("it has the object {name:?} twice")
         } else {
             continue;
         };
-        return Err(EnsembleProblem::ObjectName { name: name.clone(), why });
+        return Err(wrong.fix(NAMES));
     }
     Ok(())
 }

@@ -1,7 +1,9 @@
 //! Features of an ensemble among the columns of its file: with names that a model can hold, and no more than it can have.
 
+use super::check::feature_count;
+use super::import::damaged;
 use super::{Columns, Inputs, MAX_FEATURES, Node, Tree};
-use crate::error::EnsembleProblem;
+use crate::error::{Result, problem};
 use std::collections::BTreeSet;
 
 /// The most bytes of a feature's name: a compiled model has one byte for its length.
@@ -10,14 +12,11 @@ pub(super) const MAX_NAME: usize = 255;
 const MAX_COLUMNS: usize = 1 << 16;
 
 /// Returns an error if rows have more columns than can be numbered.
-pub(super) fn check_count(columns: usize) -> Result<(), EnsembleProblem> {
+pub(super) fn check_count(columns: usize) -> Result<()> {
     if columns <= MAX_COLUMNS {
         return Ok(());
     }
-    Err(EnsembleProblem::Unsupported {
-        what: format!("its rows have {columns} columns, more than {MAX_COLUMNS}"),
-        way: "Train on fewer columns.".into(),
-    })
+    Err(problem!("its rows have {columns} columns, more than {MAX_COLUMNS}").fix("Train on fewer columns."))
 }
 
 /// The features of trees that split on columns with these names; empty names do not count. If there are more columns
@@ -26,7 +25,7 @@ pub(super) fn features(
     names: Vec<String>,
     trees: &mut [Tree],
     notes: &mut Vec<String>,
-) -> Result<(Vec<String>, Option<Columns>), EnsembleProblem> {
+) -> Result<(Vec<String>, Option<Columns>)> {
     check_count(names.len())?;
     let names = held(names, notes);
     let count = names.len();
@@ -35,13 +34,10 @@ pub(super) fn features(
     }
     let mut used: BTreeSet<usize> = trees.iter_mut().flat_map(splits).map(|feature| *feature).collect();
     if used.len() > MAX_FEATURES {
-        return Err(EnsembleProblem::FeatureCount { count, used: used.len(), most: MAX_FEATURES });
+        return Err(feature_count(count, used.len()));
     }
     if let Some(&feature) = used.last().filter(|&&feature| feature >= count) {
-        return Err(EnsembleProblem::Damaged {
-            kind: "trees",
-            what: format!("a split is of feature {feature} of {count}"),
-        });
+        return Err(damaged("trees", format_args!("a split is of feature {feature} of {count}")));
     }
     if used.is_empty() {
         used.insert(0);
@@ -143,7 +139,6 @@ mod tests {
         assert_eq!((own.len(), columns, feature(&trees[0])), (256, None, 255));
         let mut many: Vec<Tree> = (0..257).map(tree).collect();
         let refused = features(vec![String::new(); 300], &mut many, &mut notes).unwrap_err();
-        assert_eq!(refused, EnsembleProblem::FeatureCount { count: 300, used: 257, most: 256 });
         let said = refused.to_string();
         assert!(said.contains("its trees use 257 of its 300 features, and not 1 to 256"), "{said}");
         assert!(features(vec![String::new(); MAX_COLUMNS + 1], &mut [tree(0)], &mut notes).is_err());

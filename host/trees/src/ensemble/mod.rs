@@ -6,7 +6,7 @@
 
 mod check;
 pub(crate) mod columns;
-mod error;
+pub(crate) mod faults;
 pub mod import;
 mod inputs;
 mod nodes;
@@ -16,7 +16,6 @@ mod xgboost;
 
 pub(crate) use check::check_leaf;
 pub use check::{MAX_FEATURES, MAX_OBJECTS, check_names};
-pub use error::{EnsembleProblem, NameProblem, TreeProblem};
 #[cfg(test)]
 pub(crate) use inputs::computed;
 pub use inputs::{Inputs, Occurring, Schema};

@@ -1,7 +1,7 @@
 //! Code shared by the readers of other libraries' trees.
 
-use super::Node;
-use crate::error::TreeProblem;
+use super::{Node, faults};
+use crate::error::Result;
 
 /// A threshold as a library compares with it: in f64, at times including the threshold itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,16 +71,13 @@ fn from(threshold: f64) -> f32 {
 
 /// The nodes that the root leads to, in the file's order and numbered again: XGBoost leaves pruned nodes behind. Each
 /// may be reached once only, which rules out cycles.
-pub(super) fn reachable(
-    count: usize,
-    read: impl Fn(usize) -> Result<Node, TreeProblem>,
-) -> Result<Vec<Node>, TreeProblem> {
+pub(super) fn reachable(count: usize, read: impl Fn(usize) -> Result<Node>) -> Result<Vec<Node>> {
     let mut found: Vec<Option<Node>> = vec![None; count];
     let mut waiting = vec![0];
     while let Some(position) = waiting.pop() {
-        let Some(slot) = found.get_mut(position) else { return Err(TreeProblem::NoNodes) };
+        let Some(slot) = found.get_mut(position) else { return Err(faults::no_nodes()) };
         if slot.is_some() {
-            return Err(TreeProblem::ReachedTwice { node: position });
+            return Err(faults::reached_twice(position));
         }
         let node = read(position)?;
         if let Node::Split { left, right, .. } = node {

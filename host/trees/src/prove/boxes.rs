@@ -1,8 +1,8 @@
 //! Boxes of rows: for each feature an interval of keys, and whether a missing value is in it.
 
-use super::ProofProblem;
 use super::numbers::Numbers;
 use crate::ensemble::{Ensemble, Node, Output, Threshold};
+use crate::error::{Error, Result, problem};
 use palpate_shared::format::f32_key;
 
 /// Values of a feature: keys from `low` to `high`, both included, and perhaps a missing one.
@@ -91,6 +91,11 @@ pub(super) enum Step {
     Leaf(Vec<f64>),
 }
 
+/// Bytes that are accepted as a model and break its format.
+pub(super) fn no_model(what: &str) -> Error {
+    problem!("the model does not follow its format: {what}").fix("Export the model again.")
+}
+
 /// Splits above a leaf, at most: as many as the compiler takes.
 const DEEPEST: usize = 256;
 
@@ -98,16 +103,14 @@ impl Tree {
     /// A tree whose first node is its root.
     ///
     /// # Errors
-    /// [`ProofProblem::Format`] if it is too deep to be walked, or its nodes do not make a tree.
-    pub(super) fn new(nodes: Vec<Step>, object: Option<usize>) -> Result<Self, ProofProblem> {
+    /// If it is too deep to be walked, or its nodes do not make a tree.
+    pub(super) fn new(nodes: Vec<Step>, object: Option<usize>) -> Result<Self> {
         let (mut open, mut seen) = (vec![(0, 0)], 0);
         while let Some((at, depth)) = open.pop() {
             seen += 1;
             let node = nodes.get(at).filter(|_| seen <= nodes.len());
-            match node.ok_or(ProofProblem::Format { what: "nodes that are no tree" })? {
-                Step::Split(..) if depth == DEEPEST => {
-                    return Err(ProofProblem::Format { what: "a tree of more than 256 levels" });
-                }
+            match node.ok_or_else(|| no_model("nodes that are no tree"))? {
+                Step::Split(..) if depth == DEEPEST => return Err(no_model("a tree of more than 256 levels")),
                 Step::Split(_, children) => open.extend(children.map(|child| (child, depth + 1))),
                 Step::Leaf(_) => {}
             }
@@ -213,7 +216,7 @@ impl Keys {
 ///
 /// # Errors
 /// Errors of [`Tree::new`].
-pub(super) fn of_ensemble(ensemble: &Ensemble, numbers: &Numbers<'_>, keys: &Keys) -> Result<Vec<Tree>, ProofProblem> {
+pub(super) fn of_ensemble(ensemble: &Ensemble, numbers: &Numbers<'_>, keys: &Keys) -> Result<Vec<Tree>> {
     let step = |number: usize, index: usize, node: &Node| match node {
         Node::Leaf(_) => Step::Leaf(numbers.leaf(number, index)),
         &Node::Split { feature, threshold, missing_left, left, right } => {

@@ -2,8 +2,9 @@
 
 use super::boxes::{Rows, See, Values, between, cuts_of};
 use super::span::{Span, spans};
-use super::{ProofProblem, Subject, output_of};
+use super::{Subject, output_of};
 use crate::ensemble::Occurring;
+use crate::error::{Error, Result};
 
 /// The sums of the ensemble's leaves that `rows` reach, rounded to f32 at each addition, as libraries do.
 fn sums(subject: Subject<'_>, rows: &mut Rows) -> Vec<Span> {
@@ -26,7 +27,7 @@ const MOST: usize = 2_000_000;
 
 /// The largest difference of a margin to the ensemble's f32 sum in any cell between its thresholds; `None` if there are too
 /// many of them.
-pub(super) fn error_in_cells(subject: Subject<'_>) -> Result<Option<f64>, ProofProblem> {
+pub(super) fn error_in_cells(subject: Subject<'_>) -> Result<Option<f64>> {
     let choices = choices(subject);
     let cells = choices.iter().map(|own| own.iter().try_fold(1_usize, |cells, own| cells.checked_mul(own.len())));
     let cells = cells.sum::<Option<usize>>().and_then(|cells| cells.checked_mul(subject.sources.len()));
@@ -76,11 +77,7 @@ fn choices(subject: Subject<'_>) -> Vec<Vec<Vec<Values>>> {
 }
 
 /// Calls `see` with the margins of each combination of values, as the chip computes them.
-fn each_cell(
-    subject: Subject<'_>,
-    choices: &[Vec<Vec<Values>>],
-    see: &mut See<'_, ProofProblem>,
-) -> Result<(), ProofProblem> {
+fn each_cell(subject: Subject<'_>, choices: &[Vec<Vec<Values>>], see: &mut See<'_, Error>) -> Result<()> {
     let mut rows = subject.plain.keys.all(subject.plain.features);
     choices.iter().try_for_each(|choices| {
         each(choices, 0, &mut rows, &mut |rows| see(&subject.margins(&subject.row(rows)), rows))
@@ -92,8 +89,8 @@ fn each(
     choices: &[Vec<Values>],
     feature: usize,
     rows: &mut Vec<Values>,
-    see: &mut dyn FnMut(&mut Vec<Values>) -> Result<(), ProofProblem>,
-) -> Result<(), ProofProblem> {
+    see: &mut dyn FnMut(&mut Vec<Values>) -> Result<()>,
+) -> Result<()> {
     let Some(own) = choices.get(feature) else { return see(rows) };
     own.iter().try_for_each(|&values| {
         rows[feature] = values;

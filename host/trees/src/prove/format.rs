@@ -1,8 +1,8 @@
 //! A reader of compiled models written from `shared/FORMAT.md` alone: it shares nothing with the compiler, nor with what
 //! the chip runs, so that a mistake of either shows.
 
-use super::ProofProblem;
-use super::boxes::{Keys, Rule, Step, Tree, Values};
+use super::boxes::{Keys, Rule, Step, Tree, Values, no_model};
+use crate::error::{Error, Result};
 
 /// A model's meaning.
 #[derive(Debug)]
@@ -42,37 +42,39 @@ struct Axis {
     cuts: Vec<i64>,
 }
 
-const SHORT: ProofProblem = ProofProblem::Format { what: "it ends too early" };
+fn too_short() -> Error {
+    no_model("it ends too early")
+}
 
 /// Bytes that are read from the front.
 struct Bytes<'b>(&'b [u8]);
 
 impl<'b> Bytes<'b> {
-    fn take(&mut self, length: usize) -> Result<&'b [u8], ProofProblem> {
-        let (part, rest) = self.0.split_at_checked(length).ok_or(SHORT)?;
+    fn take(&mut self, length: usize) -> Result<&'b [u8]> {
+        let (part, rest) = self.0.split_at_checked(length).ok_or_else(too_short)?;
         self.0 = rest;
         Ok(part)
     }
 
-    fn byte(&mut self) -> Result<u8, ProofProblem> {
+    fn byte(&mut self) -> Result<u8> {
         Ok(self.take(1)?[0])
     }
 
-    fn number(&mut self, length: usize) -> Result<usize, ProofProblem> {
+    fn number(&mut self, length: usize) -> Result<usize> {
         Ok(self.take(length)?.iter().rev().fold(0, |number, &byte| number << 8 | usize::from(byte)))
     }
 
-    fn signed(&mut self, length: usize) -> Result<i64, ProofProblem> {
+    fn signed(&mut self, length: usize) -> Result<i64> {
         let number = self.number(length)? as i64;
         let half = 1_i64 << (8 * length - 1);
         Ok(if number >= half { number - 2 * half } else { number })
     }
 
-    fn float(&mut self) -> Result<f32, ProofProblem> {
+    fn float(&mut self) -> Result<f32> {
         Ok(f32::from_bits(self.number(4)? as u32))
     }
 
-    fn text(&mut self) -> Result<String, ProofProblem> {
+    fn text(&mut self) -> Result<String> {
         let length = usize::from(self.byte()?);
         Ok(String::from_utf8_lossy(self.take(length)?).into_owned())
     }
@@ -88,17 +90,17 @@ struct Leaves<'b> {
 
 impl Leaves<'_> {
     /// Values of the next leaf, of `count` values.
-    fn next(&self, bytes: &mut Bytes<'_>, count: usize, shift: u32) -> Result<Vec<f64>, ProofProblem> {
+    fn next(&self, bytes: &mut Bytes<'_>, count: usize, shift: u32) -> Result<Vec<f64>> {
         let size = 1 << self.kind;
         let values = match self.shared {
             None => bytes.take(count * size)?,
             Some((width, table)) => {
                 let start = bytes.number(width)? * count * size;
-                table.get(start..start + count * size).ok_or(SHORT)?
+                table.get(start..start + count * size).ok_or_else(too_short)?
             }
         };
         let mut values = Bytes(values);
-        let value = |_| -> Result<f64, ProofProblem> {
+        let value = |_| -> Result<f64> {
             Ok(match self.kind {
                 0 => (f64::from(values.byte()?) - 128.0) * f64::from(shift).exp2() * self.unit,
                 1 => values.signed(2)? as f64 * f64::from(shift).exp2() * self.unit,
@@ -165,7 +167,7 @@ struct Stated<'b> {
 }
 
 impl<'b> Stated<'b> {
-    fn read(mut sections: Bytes<'b>, features: usize, outputs: usize) -> Result<Self, ProofProblem> {
+    fn read(mut sections: Bytes<'b>, features: usize, outputs: usize) -> Result<Self> {
         let mut stated = Self {
             shared: None,
             sentinel: None,
@@ -216,12 +218,12 @@ impl<'b> Stated<'b> {
 /// Reads a model.
 ///
 /// # Errors
-/// [`ProofProblem::Format`] if a section ends too early, or points out of the model.
-pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
+/// If a section ends too early, or points out of the model.
+pub(super) fn read(bytes: &[u8]) -> Result<Plain> {
     let mut header = Bytes(bytes);
     header.take(4)?;
     if header.number(2)? != 3 {
-        return Err(ProofProblem::Format { what: "another version" });
+        return Err(no_model("another version"));
     }
     let (layout, kind) = (header.byte()?, header.byte()?);
     header.take(4)?;
@@ -233,7 +235,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
     let (unit_bits, unit_shift) = (header.number(4)? as f64, f64::from(header.byte()?));
     header.take(3)?;
     if (unit * std::f64::consts::LOG2_E * (32.0 + unit_shift).exp2() - unit_bits).abs() > 1.0 {
-        return Err(ProofProblem::Format { what: "its unit in nats is not its unit in bits" });
+        return Err(no_model("its unit in nats is not its unit in bits"));
     }
     let error = f64::from(header.float()?);
     header.take(20)?;
@@ -250,7 +252,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
         Stated::read(Bytes(rest.take(sections_length)?), features, objects)?;
     let is_f32 = kind == 2;
     let leaves_of = Leaves { kind, unit: if is_f32 { scale } else { unit * scale }, shared };
-    let base: Result<Vec<f64>, _> = (0..objects)
+    let base: Result<Vec<f64>> = (0..objects)
         .map(|_| match is_f32 {
             true => Ok(f64::from(rest.float()?) * scale),
             false => Ok(rest.signed(4)? as f64 * unit * scale),
@@ -264,19 +266,19 @@ pub(super) fn read(bytes: &[u8]) -> Result<Plain, ProofProblem> {
     let splits = Bytes(rest.take(splits_length)?);
     let leaves = Bytes(rest.take(leaves_length)?);
     if rest.0.len() != 4 {
-        return Err(ProofProblem::Format { what: "sections of other lengths than it states" });
+        return Err(no_model("sections of other lengths than it states"));
     }
     let mut cuts = Bytes(cuts_bytes);
-    let axis = |_| -> Result<Axis, ProofProblem> {
+    let axis = |_| -> Result<Axis> {
         let (feature, columns) = (axis_bytes.number(1)?, axis_bytes.byte()?);
         let (width, count) = (axis_bytes.number(1)?, axis_bytes.number(1)?);
         if !(1..=4).contains(&width) {
-            return Err(ProofProblem::Format { what: "thresholds of no width" });
+            return Err(no_model("thresholds of no width"));
         }
-        let cuts: Result<Vec<i64>, _> = (0..count).map(|_| cuts.signed(width)).collect();
+        let cuts: Result<Vec<i64>> = (0..count).map(|_| cuts.signed(width)).collect();
         Ok(Axis { feature, columns, cuts: cuts? })
     };
-    let axes: Result<Vec<Axis>, _> = (0..axis_count).map(axis).collect();
+    let axes: Result<Vec<Axis>> = (0..axis_count).map(axis).collect();
     let axes = axes?;
     let keys = match key {
         1 => Keys::Real,
@@ -321,7 +323,7 @@ impl Parts<'_> {
         mut group_bytes: Bytes<'_>,
         mut splits: Bytes<'_>,
         mut leaves: Bytes<'_>,
-    ) -> Result<Vec<(Tree, f64)>, ProofProblem> {
+    ) -> Result<Vec<(Tree, f64)>> {
         let mut trees = Vec::new();
         let columns: Vec<(&Axis, bool)> = axes
             .iter()
@@ -364,14 +366,14 @@ fn preorder(
     is_wide: bool,
     cuts: &[u8],
     ranked: &dyn Fn(usize, usize) -> Rule,
-) -> Result<Vec<Split>, ProofProblem> {
+) -> Result<Vec<Split>> {
     let count = splits.number(2)?;
     let mut read = Vec::with_capacity(count);
     for _ in 0..count {
         read.push(if is_wide {
             let (feature, missing) = (splits.number(1)?, splits.byte()?);
             let number = splits.number(2)?;
-            let cut = Bytes(cuts.get(4 * number..).ok_or(SHORT)?).signed(4)?;
+            let cut = Bytes(cuts.get(4 * number..).ok_or_else(too_short)?).signed(4)?;
             (Rule { feature, cut, missing_left: missing != 0 }, splits.number(2)?)
         } else {
             let (column, at) = (splits.number(1)?, splits.number(1)?);
@@ -385,12 +387,12 @@ fn preorder(
         if below == 0 {
             continue;
         }
-        let &(rule, left) = read.get(at).ok_or(SHORT)?;
-        let right = below.checked_sub(left + 1).ok_or(ProofProblem::Format { what: "a subtree beyond its tree" })?;
+        let &(rule, left) = read.get(at).ok_or_else(too_short)?;
+        let right = below.checked_sub(left + 1).ok_or_else(|| no_model("a subtree beyond its tree"))?;
         let number = |at, below, leaf| if below == 0 { count + leaf } else { at };
         let parts = [[at + 1, left, leaf], [at + 1 + left, right, leaf + left + 1]];
         nodes[at] = Some((rule, parts.map(|[at, below, leaf]| number(at, below, leaf))));
         open.extend(parts);
     }
-    nodes.into_iter().collect::<Option<Vec<_>>>().ok_or(SHORT)
+    nodes.into_iter().collect::<Option<Vec<_>>>().ok_or_else(too_short)
 }

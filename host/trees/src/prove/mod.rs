@@ -13,17 +13,14 @@
 
 mod boxes;
 mod cells;
-mod error;
 mod format;
 mod numbers;
 mod span;
 mod trees;
 
-pub use error::ProofProblem;
-
 use crate::compile::{self, Instructions, Source};
 use crate::ensemble::{Ensemble, Inputs};
-use crate::error::Result;
+use crate::error::{Error, Result, problem};
 use crate::rows::{Encoder, missing_text};
 use boxes::{Keys, Rows, Tree, Values, of_ensemble};
 use format::Plain;
@@ -31,6 +28,7 @@ use numbers::Numbers;
 use palpate_onboard::Model;
 use palpate_shared::MISSING_FEATURE;
 use palpate_shared::format::{LeafType, Link, f32_key};
+use std::fmt::Display;
 
 /// Result of a proof.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -76,8 +74,7 @@ struct Matched {
 /// Proves that a model, given by its bytes, adds for every row what `ensemble` adds.
 ///
 /// # Errors
-/// [`CompileProblem::Model`](crate::error::CompileProblem::Model) if the bytes are no model; [`ProofProblem`] that says for
-/// which rows it does not.
+/// If the bytes are no model; if it does not, for which rows.
 pub fn prove(bytes: &[u8], ensemble: &Ensemble) -> Result<Proof> {
     let model = compile::open(bytes)?;
     let plain = format::read(bytes)?;
@@ -92,7 +89,11 @@ pub fn prove(bytes: &[u8], ensemble: &Ensemble) -> Result<Proof> {
     {
         // Features that a model computes have fewer values than rows of them.
         if exact > proof.stated * (1.0 + 1e-6) && ensemble.schema().is_none() {
-            return Err(ProofProblem::Beyond { stated: proof.stated, found: exact }.into());
+            let stated = proof.stated;
+            return Err(problem!(
+                "a margin differs by {exact:e} for some row, more than the {stated:e} that the model states"
+            )
+            .fix(OTHER_FILE));
         }
         proof.margin_error = exact;
     }
@@ -113,17 +114,17 @@ pub(crate) struct Reached {
 /// The leaves of a model's trees that a row of keys reaches; in a tree of the ensemble it reaches `node`.
 ///
 /// # Errors
-/// [`ProofProblem`] if the bytes cannot be read, or the model has another number of trees than it should.
+/// If the bytes cannot be read, or the model has another number of trees than it should.
 pub(crate) fn leaves_at(
     model: &Model<'_>,
     ensemble: &Ensemble,
     row: &[i32],
     node: impl Fn(usize) -> usize,
-) -> Result<Vec<Reached>, ProofProblem> {
+) -> Result<Vec<Reached>> {
     let plain = format::read(model.bytes())?;
     let order = plain.order(ensemble, model.leaf_type())?;
     if order.len() != plain.trees.len() {
-        return Err(ProofProblem::Trees { what: format!("{} and not {}", plain.trees.len(), order.len()) });
+        return Err(other_trees(format_args!("{} and not {}", plain.trees.len(), order.len())));
     }
     let numbers = Numbers::new(&plain, ensemble);
     let mut row: Vec<Values> = row.iter().map(|key| plain.values(*key)).collect();
@@ -131,7 +132,7 @@ pub(crate) fn leaves_at(
         let mut own = Vec::new();
         tree.leaves(&mut row, &mut |leaf, _| {
             own = leaf.to_vec();
-            Ok::<(), ProofProblem>(())
+            Ok::<(), Error>(())
         })?;
         let mut expected = vec![-f64::from(source.offset) * step; own.len()];
         for &tree in &source.trees {
@@ -175,10 +176,9 @@ impl Plain {
     }
 
     /// Trees of the ensemble that each tree of the model should stand for, as the compiler has them.
-    fn order(&self, ensemble: &Ensemble, leaf: LeafType) -> Result<Vec<Source>, ProofProblem> {
+    fn order(&self, ensemble: &Ensemble, leaf: LeafType) -> Result<Vec<Source>> {
         let scales = if let Keys::Scaled(scales) = &self.keys { Some(scales.as_slice()) } else { None };
-        let order = compile::order(ensemble, leaf, scales);
-        order.map_err(|error| ProofProblem::Trees { what: error.to_string() })
+        compile::order(ensemble, leaf, scales).map_err(other_trees)
     }
 }
 
@@ -242,14 +242,18 @@ impl Subject<'_> {
     }
 
     /// Returns an error unless the chip's margins of a row are the sums of the leaves that were read.
-    fn agrees(&self, row: &[i32]) -> Result<(), ProofProblem> {
+    fn agrees(&self, row: &[i32]) -> Result<()> {
         let own = self.margins(row);
         for (object, (own, read)) in own.into_iter().zip(self.plain.margins(row)).enumerate() {
             let is_same = if self.plain.most > 0.0 { (own - read).abs() < 0.25 * self.plain.unit } else { own == read };
             if !is_same {
-                let output = self.ensemble.objects[object].clone();
+                let output = &self.ensemble.objects[object];
                 let rows: Vec<Values> = row.iter().map(|key| self.plain.values(*key)).collect();
-                return Err(ProofProblem::Chip { output, chip: own, read, rows: self.example(&rows) });
+                return Err(problem!(
+                    "the chip's code gives {own:e} for {output} where the model's leaves add up to {read:e}: {}",
+                    self.example(&rows)
+                )
+                .fix(OTHER_FILE));
             }
         }
         Ok(())
@@ -281,15 +285,26 @@ impl Subject<'_> {
     }
 }
 
+/// Advice on a model that is not the ensemble's.
+const OTHER_FILE: &str = "Give the file that the model was exported from, with the same --missing and --all-trees; if it is that, export the model again.";
+
+/// Trees of the ensemble that are missing in the model, or too many.
+fn other_trees(what: impl Display) -> Error {
+    problem!("the model's trees stand for other trees than the ensemble's: {what}").fix(OTHER_FILE)
+}
+
 /// The output that a value of a leaf is for, of a tree of one output or of all.
 fn output_of(object: Option<usize>, value: usize) -> usize {
     object.unwrap_or(value)
 }
 
 /// Returns an error unless names, features and predictions are the ensemble's.
-fn statements(plain: &Plain, ensemble: &Ensemble) -> Result<(), ProofProblem> {
-    let same = |what, model: String, ensemble: String| {
-        if model == ensemble { Ok(()) } else { Err(ProofProblem::Statement { what, model, ensemble }) }
+fn statements(plain: &Plain, ensemble: &Ensemble) -> Result<()> {
+    let same = |what: &str, model: String, ensemble: String| {
+        if model == ensemble {
+            return Ok(());
+        }
+        Err(problem!("the model's {what} are not the ensemble's: {model}, and not {ensemble}").fix(OTHER_FILE))
     };
     // They are matched by position, since `export --names` names them otherwise; the same names in another order are others.
     let sorted = |names: &[String]| {

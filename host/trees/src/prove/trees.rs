@@ -2,9 +2,10 @@
 
 use super::boxes::{Rows, Step, Tree, Values, between, cuts_of};
 use super::span::{Span, spans};
-use super::{Found, Matched, ProofProblem, Subject, output_of};
+use super::{Found, Matched, OTHER_FILE, Subject, other_trees, output_of};
 use crate::compile::Source;
 use crate::ensemble::Output;
+use crate::error::{Result, problem};
 use rayon::prelude::*;
 
 /// A tree of a model, and the trees that it stands for.
@@ -29,11 +30,7 @@ impl Pair<'_> {
 
     /// Calls `see` with the rows between the thresholds of merged trees, one interval after the other: what two of them change
     /// at a threshold may cancel out, and then the model has none there.
-    fn each_part(
-        &self,
-        rows: &mut Rows,
-        see: &mut dyn FnMut(&mut Rows) -> Result<(), ProofProblem>,
-    ) -> Result<(), ProofProblem> {
+    fn each_part(&self, rows: &mut Rows, see: &mut dyn FnMut(&mut Rows) -> Result<()>) -> Result<()> {
         let [Step::Split(rule, _), ..] = self.trees[0].nodes.as_slice() else { return see(rows) };
         if self.trees.len() == 1 {
             return see(rows);
@@ -64,18 +61,18 @@ impl Pair<'_> {
         rows: &Rows,
         subject: Subject<'_>,
         compared: &mut Compared,
-    ) -> Result<(), ProofProblem> {
+    ) -> Result<()> {
         for (value, (&model, span)) in leaf.iter().zip(spans).enumerate() {
             let farthest = span.farthest(model);
             if !span.is(model, self.step) {
-                return Err(ProofProblem::Leaf {
-                    tree: self.number,
-                    source_tree: self.stands_for.trees[0],
-                    output: subject.ensemble.objects[output_of(self.object, value)].clone(),
-                    model,
-                    ensemble: farthest,
-                    rows: subject.example(rows),
-                });
+                let (tree, source) = (self.number, self.stands_for.trees[0]);
+                let output = &subject.ensemble.objects[output_of(self.object, value)];
+                return Err(problem!(
+                    "for some rows the model's tree {tree} adds {model:e} to {output} where tree {source} of the ensemble has \
+                     {farthest:e}: {}",
+                    subject.example(rows)
+                )
+                .fix(OTHER_FILE));
             }
             compared.add(value, model, (model - farthest).abs());
         }
@@ -84,11 +81,11 @@ impl Pair<'_> {
 }
 
 /// Compares the model's trees with those that they stand for, from their leaves on to the ensemble's.
-pub(super) fn compare(subject: Subject<'_>, order: &[Source]) -> Result<Found, ProofProblem> {
+pub(super) fn compare(subject: Subject<'_>, order: &[Source]) -> Result<Found> {
     let Subject { plain, sources, .. } = subject;
     if order.len() != plain.trees.len() {
-        let what = format!("the model has {} trees, and should have {}", plain.trees.len(), order.len());
-        return Err(ProofProblem::Trees { what });
+        let (found, wanted) = (plain.trees.len(), order.len());
+        return Err(other_trees(format_args!("the model has {found} trees, and should have {wanted}")));
     }
     let alone = alone(sources, order.iter().flat_map(|source| source.trees.iter().copied()))?;
     let mut found = Found { trees: Vec::new(), boxes: 0, outputs: Vec::new() };
@@ -97,8 +94,7 @@ pub(super) fn compare(subject: Subject<'_>, order: &[Source]) -> Result<Found, P
         let (object, step) = (tree.object, *step);
         let trees: Vec<&Tree> = stands_for.trees.iter().map(|&source| &sources[source]).collect();
         if trees.is_empty() || trees.iter().any(|own| own.object != object) {
-            let what = format!("tree {number} adds to other outputs than what it stands for");
-            return Err(ProofProblem::Trees { what });
+            return Err(other_trees(format_args!("tree {number} adds to other outputs than what it stands for")));
         }
         let values = if object.is_some() { 1 } else { plain.names.len() };
         let pair = Pair { number, object, step, stands_for, trees, values };
@@ -126,13 +122,13 @@ pub(super) fn compare(subject: Subject<'_>, order: &[Source]) -> Result<Found, P
 }
 
 /// Trees of the ensemble that stand alone: each one of the model's takes some of the others, and none twice.
-fn alone(sources: &[Tree], taken: impl IntoIterator<Item = usize>) -> Result<Vec<usize>, ProofProblem> {
+fn alone(sources: &[Tree], taken: impl IntoIterator<Item = usize>) -> Result<Vec<usize>> {
     let mut is_taken = vec![false; sources.len()];
     for source in taken {
         match is_taken.get_mut(source) {
             Some(is_taken) if !*is_taken => *is_taken = true,
-            Some(_) => return Err(ProofProblem::Trees { what: format!("tree {source} is there twice") }),
-            None => return Err(ProofProblem::Trees { what: format!("there is no tree {source}") }),
+            Some(_) => return Err(other_trees(format_args!("tree {source} is there twice"))),
+            None => return Err(other_trees(format_args!("there is no tree {source}"))),
         }
     }
     Ok((0..sources.len()).filter(|&source| !is_taken[source]).collect())
@@ -205,11 +201,11 @@ impl<'s> Totals<'s> {
     }
 
     /// Trees without a split are in the base. Each was rounded to the steps of a tree of its own.
-    fn alone(&mut self, alone: &[usize]) -> Result<(), ProofProblem> {
+    fn alone(&mut self, alone: &[usize]) -> Result<()> {
         for &source in alone {
             let tree = &self.subject.sources[source];
             let Some(values) = tree.constant() else {
-                return Err(ProofProblem::Trees { what: format!("tree {source} is missing") });
+                return Err(other_trees(format_args!("tree {source} is missing")));
             };
             let largest = values.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
             let step = self.subject.plain.step_for(largest);
@@ -230,7 +226,7 @@ impl<'s> Totals<'s> {
     }
 
     /// For each output the error and the ends of its margin.
-    fn finish(self) -> Result<Vec<[f64; 3]>, ProofProblem> {
+    fn finish(self) -> Result<Vec<[f64; 3]>> {
         let output = |(object, sums): (usize, Sums)| {
             let (model, unit) = (self.subject.plain.base[object], self.subject.plain.rounded_to());
             let is_same = match unit > 0.0 {
@@ -238,8 +234,11 @@ impl<'s> Totals<'s> {
                 false => model == sums.base,
             };
             if !is_same {
-                let output = self.subject.ensemble.objects[object].clone();
-                return Err(ProofProblem::Base { output, model, ensemble: sums.base });
+                let (output, ensemble) = (&self.subject.ensemble.objects[object], sums.base);
+                return Err(problem!(
+                    "the model's margin of {output} starts from {model:e}, where the ensemble starts from {ensemble:e}"
+                )
+                .fix(OTHER_FILE));
             }
             Ok([sums.error + (model - sums.base).abs(), sums.least, sums.most])
         };
@@ -248,13 +247,13 @@ impl<'s> Totals<'s> {
 }
 
 /// Returns an error if sums of f32 would be added in another order.
-fn in_order(found: &Found, subject: Subject<'_>) -> Result<(), ProofProblem> {
+fn in_order(found: &Found, subject: Subject<'_>) -> Result<()> {
     let Subject { plain, ensemble, .. } = subject;
     if plain.most == 0.0 {
         let mut last = vec![None; plain.names.len()];
         for tree in &found.trees {
             let &[source] = tree.sources.as_slice() else {
-                return Err(ProofProblem::Trees { what: "trees with f32 leaves were merged".into() });
+                return Err(other_trees("trees with f32 leaves were merged"));
             };
             let outputs = match ensemble.trees[source].output {
                 Output::One(object) => object..object + 1,
@@ -262,8 +261,7 @@ fn in_order(found: &Found, subject: Subject<'_>) -> Result<(), ProofProblem> {
             };
             for last in &mut last[outputs] {
                 if last.replace(source).is_some_and(|last| last > source) {
-                    let what = format!("f32 leaves of tree {source} are added in another order");
-                    return Err(ProofProblem::Trees { what });
+                    return Err(other_trees(format_args!("f32 leaves of tree {source} are added in another order")));
                 }
             }
         }

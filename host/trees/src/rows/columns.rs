@@ -1,7 +1,7 @@
 //! Columns of a table that are a model's features: found by name, or taken by position where there are no names.
 
-use super::RowsProblem;
-use crate::ensemble::{Ensemble, columns::holdable};
+use crate::ensemble::{Columns, Ensemble, columns::holdable};
+use crate::error::{Error, Result, problem};
 use palpate_onboard::Model;
 use palpate_shared::format::Tag;
 use std::collections::HashSet;
@@ -104,11 +104,12 @@ impl Features {
     /// their position. Numbers alone are a row without a header, unless they count from 0 or are the features' own names.
     ///
     /// # Errors
-    /// [`RowsProblem::Unmatched`], [`RowsProblem::Repeated`], [`RowsProblem::NumbersAlone`], [`RowsProblem::Columns`].
-    pub fn among(&self, header: &[&str], others: &[usize]) -> Result<Matched, RowsProblem> {
+    /// If a feature is none of the columns, two columns have the same name, the header is numbers alone, or columns without
+    /// names are neither as many as features nor as many as the library had.
+    pub fn among(&self, header: &[&str], others: &[usize]) -> Result<Matched> {
         let mut seen = HashSet::new();
         if let Some(name) = header.iter().find(|name| !name.is_empty() && !seen.insert(**name)) {
-            return Err(RowsProblem::Repeated { name: (*name).into() });
+            return Err(repeated(name));
         }
         let by_name = |columns| Ok(Matched { columns, by_position: false });
         let is_unique = self.names().collect::<HashSet<_>>().len() == self.count();
@@ -120,7 +121,8 @@ impl Features {
         let theirs = numbers(names.iter().copied());
         let is_counted = theirs.as_ref().is_some_and(|numbers| numbers.iter().copied().eq(0..names.len()));
         if is_numbers_alone(&names) && !is_counted {
-            return Err(RowsProblem::NumbersAlone { cells: names.iter().map(ToString::to_string).collect() });
+            return Err(problem!("its columns are named {}: numbers alone", some(&names))
+                .fix("Write the features' names into the first line, above the first row."));
         }
         if let (Some(own), Some(theirs)) = (numbers(self.names()), &theirs)
             && let Some(positions) = found(own.iter(), &theirs.iter().collect::<Vec<_>>())
@@ -135,22 +137,23 @@ impl Features {
         let plain: Vec<&str> = plain.iter().map(String::as_str).collect();
         let used = |name: &&String| plain.iter().filter(|column| **column == name.as_str()).count();
         if let Some(name) = own.iter().find(|name| used(name) > 1) {
-            return Err(RowsProblem::Repeated { name: name.clone() });
+            return Err(repeated(name));
         }
         found(own.iter().map(String::as_str), &plain).map_or_else(
             || {
                 let missing = self.names().zip(&own).filter(|(_, plain)| used(plain) == 0);
-                Err(RowsProblem::Unmatched {
-                    missing: missing.map(|(name, _)| name.into()).collect(),
-                    header: header.iter().map(ToString::to_string).collect(),
-                })
+                let missing: Vec<&str> = missing.map(|(name, _)| name).collect();
+                Err(problem!("no column is named {}; its columns are {}", some(&missing), some(header)).fix(
+                    "Name the columns as the model's features, in any order; or 0, 1 and so on, to take them by their \
+                     position.",
+                ))
             },
             by_name,
         )
     }
 
     /// The features among columns without names, given their positions.
-    fn by_position(&self, open: &[usize]) -> Result<Matched, RowsProblem> {
+    fn by_position(&self, open: &[usize]) -> Result<Matched> {
         let columns = match self.of_width(open.len())? {
             None => open.to_vec(),
             Some(used) => used.iter().filter_map(|&column| open.get(column).copied()).collect(),
@@ -161,17 +164,45 @@ impl Features {
     /// The positions of the features in rows of `found` values without names; `None` if the values are the features.
     ///
     /// # Errors
-    /// [`RowsProblem::Columns`] if there are neither as many as features nor as many as the library had columns.
-    pub fn of_width(&self, found: usize) -> Result<Option<&[usize]>, RowsProblem> {
+    /// If there are neither as many as features nor as many as the library had columns.
+    pub fn of_width(&self, found: usize) -> Result<Option<&[usize]>> {
         match &self.columns {
             _ if found == self.names.len() => Ok(None),
             Some((all, used)) if found == *all => Ok(Some(used)),
             columns => {
-                let all = columns.as_ref().map(|(all, _)| *all);
-                Err(RowsProblem::Columns { found, wanted: self.names.len(), all })
+                let all = columns.as_ref().map(|(all, _)| format!(" of the library's {all} columns"));
+                Err(other_width(found, self.names.len(), &all.unwrap_or_default()))
             }
         }
     }
+}
+
+/// Returns an error unless rows have `wanted` features.
+///
+/// # Errors
+/// If they have another number of them.
+pub fn check_columns(found: usize, wanted: usize) -> Result<()> {
+    if found == wanted { Ok(()) } else { Err(other_width(found, wanted, "")) }
+}
+
+/// Another number of columns than of features.
+fn other_width(found: usize, wanted: usize, of: &str) -> Error {
+    problem!("it has {found} columns for {wanted} features{of}").fix(
+        "Name the columns as the features (`palpate inspect` lists them), or give as many columns as features, in their \
+         order.",
+    )
+}
+
+/// A name of two columns.
+fn repeated(name: &str) -> Error {
+    problem!("two columns are named {name:?}").fix("Give each column a name of its own.")
+}
+
+/// The first names of many, `?` for those that are not text.
+pub(crate) fn some<N: AsRef<str>>(names: &[N]) -> String {
+    let plain = |name: &N| name.as_ref().chars().map(|own| if own.is_control() { '?' } else { own }).collect();
+    let names: Vec<String> = names.iter().map(plain).collect();
+    Columns::first(names.iter().map(String::as_str), 12)
 }
 
 /// The position of each of these in a header, if all are there.
@@ -217,7 +248,7 @@ mod tests {
         let features = Features { names, columns: Some((300, vec![7, 299])) };
         assert_eq!(features.of_width(2), Ok(None));
         assert_eq!(features.of_width(300), Ok(Some(&[7, 299][..])));
-        let wrong = RowsProblem::Columns { found: 299, wanted: 2, all: Some(300) };
-        assert_eq!(features.of_width(299), Err(wrong));
+        let wrong = features.of_width(299).unwrap_err();
+        assert_eq!(wrong.what(), "it has 299 columns for 2 features of the library's 300 columns");
     }
 }

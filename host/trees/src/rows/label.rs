@@ -1,5 +1,7 @@
 //! Labels of rows, in the spellings that libraries and pandas give them.
 
+use crate::error::{Error, problem};
+
 /// The position of the class that a label means: its name; another spelling of it, if it is a number or a truth value, such as
 /// `1.0` for `1` and `True` for `true` or `1`; or the number of the class, if names are no numbers.
 pub(crate) fn class(classes: &[String], label: &str) -> Option<usize> {
@@ -9,6 +11,12 @@ pub(crate) fn class(classes: &[String], label: &str) -> Option<usize> {
         let by_number = || whole(label).filter(|number| *number < classes.len());
         if names_are_numbers { None } else { by_number() }
     })
+}
+
+/// A label that is none of the `known` classes, in a row that is counted from 1.
+pub(crate) fn not_a_class(label: &str, row: usize, known: &str) -> Error {
+    problem!("the label {label:?} in row {row} is none of the model's classes: {known}")
+        .fix("Correct the label, or name the model's classes with `export --names`.")
 }
 
 /// The only class whose name means the same as the label.

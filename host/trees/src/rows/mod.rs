@@ -1,7 +1,6 @@
 //! Rows of features, for models that other libraries trained: CSV files, sequences, and the chip's form of a row.
 
 mod columns;
-mod error;
 mod generate;
 mod label;
 mod notes;
@@ -9,19 +8,20 @@ pub mod scales;
 mod sequences;
 mod table;
 
-pub use columns::{BY_POSITION, Features, Matched, columns_of};
-pub use error::{ClassDiffers, RowsProblem, ValueDiffers};
+pub(crate) use columns::some;
+pub use columns::{BY_POSITION, Features, Matched, check_columns, columns_of};
 pub use generate::generate;
-pub(crate) use label::class;
+pub(crate) use label::{class, not_a_class};
 pub use notes::{notes, warnings};
 pub use sequences::{RowOf, RowSequence, SequenceColumns, Sequences, SequencesBuilder};
 
-use crate::error::{Error, Place, Result};
+use crate::error::{Error, Place, Result, problem};
 use palpate_onboard::Model;
 use palpate_shared::MISSING_FEATURE;
 use palpate_shared::format::{Key, f32_key};
+use std::fmt::Display;
 use std::path::Path;
-use table::Table;
+use table::{Table, no_rows};
 
 /// Rows of features, NaN where one is missing.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,29 +51,28 @@ impl Rows {
     /// Columns are matched as [`Features::among`] does it. The column `label` is no feature.
     ///
     /// # Errors
-    /// [`Kind::Io`](crate::error::Kind::Io); [`RowsProblem`] naming the line: a file that is not such a table or has no rows, columns that cannot
-    /// be matched, a cell that is not a number, an empty line.
+    /// [`Kind::Io`](crate::error::Kind::Io); with the line, a file that is not such a table or has no rows, columns that
+    /// cannot be matched, a cell that is not a number, an empty line.
     pub fn read(path: &Path, features: impl Into<Features>, label: Option<&str>) -> Result<Self> {
         let features = features.into();
         let table = Table::read(path)?;
         let label = label.map(|name| table.column(name)).transpose()?;
         let header: Vec<&str> = table.header.iter().map(String::as_str).collect();
-        let matched = features.among(&header, label.as_slice()).map_err(|problem| table.in_header(problem))?;
+        let matched = features.among(&header, label.as_slice()).map_err(|error| table.in_header(error))?;
         let (mut values, mut labels) = (Vec::new(), Vec::new());
         for record in table.records() {
             let (line, record) = record?;
             for &column in &matched.columns {
                 let text = record.get(column).unwrap_or_default();
                 let value = number(text).ok_or_else(|| {
-                    let column = header.get(column).copied().unwrap_or_default().to_owned();
-                    Error::variant_at(Place::line(path, line), RowsProblem::Number { column, text: text.into() })
+                    not_a_number(header.get(column).copied().unwrap_or_default(), text).at(Place::line(path, line))
                 })?;
                 values.push(value);
             }
             labels.extend(label.map(|column| record.get(column).unwrap_or_default().to_owned()));
         }
         if values.is_empty() {
-            return Err(Error::variant_at(Place::file(path), RowsProblem::Empty));
+            return Err(no_rows().at(Place::file(path)));
         }
         Ok(Self { features: features.count(), values, labels, by_position: matched.by_position })
     }
@@ -97,15 +96,14 @@ impl Rows {
 /// Reads a CSV file of margins: no header, one row per line, as many numbers in each.
 ///
 /// # Errors
-/// [`Kind::Io`](crate::error::Kind::Io); [`RowsProblem`] naming the line.
+/// [`Kind::Io`](crate::error::Kind::Io); with the line, another number of cells, and a cell that is not a number.
 pub fn read_margins(path: &Path) -> Result<Vec<Vec<f64>>> {
     let finite = |text: &str| text.parse::<f64>().ok().filter(|margin| margin.is_finite());
     let table = Table::without_header(path, "read the margins")?;
     let row = |record: Result<(u64, csv::StringRecord)>| {
         let (line, record) = record?;
         let number = |(column, text): (usize, &str)| {
-            let problem = || RowsProblem::Number { column: (column + 1).to_string(), text: text.into() };
-            finite(text).ok_or_else(|| Error::variant_at(Place::line(path, line), problem()))
+            finite(text).ok_or_else(|| not_a_number(column + 1, text).at(Place::line(path, line)))
         };
         record.iter().enumerate().map(number).collect()
     };
@@ -115,10 +113,16 @@ pub fn read_margins(path: &Path) -> Result<Vec<Vec<f64>>> {
 /// Reads a CSV file of a library's predictions: no header, one row per line, a class or a value in each, or one for each target.
 ///
 /// # Errors
-/// [`Kind::Io`](crate::error::Kind::Io); [`RowsProblem`] naming the line.
+/// [`Kind::Io`](crate::error::Kind::Io); with the line, another number of cells.
 pub fn read_values(path: &Path) -> Result<Vec<Vec<String>>> {
     let table = Table::without_header(path, "read the values")?;
     table.records().map(|record| Ok(record?.1.iter().map(String::from).collect())).collect()
+}
+
+/// A cell that is not a number, in a column by name or number.
+fn not_a_number(column: impl Display, text: &str) -> Error {
+    problem!("{text:?} in the column {column} is not a number")
+        .fix("Give a number, or leave the cell empty where the value is missing.")
 }
 
 /// A cell's number; NaN if it is empty.

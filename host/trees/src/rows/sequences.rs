@@ -1,8 +1,9 @@
 //! Sequences of rows: the rows of one object, in their order, with the object's class.
 
-use super::table::Table;
-use super::{Features, RowsProblem, class, number};
-use crate::error::{Error, Place, Result};
+use super::label::not_a_class;
+use super::table::{Table, no_column, no_rows};
+use super::{Features, class, not_a_number, number};
+use crate::error::{Error, Place, Result, problem};
 use std::collections::HashMap;
 use std::ops::Range;
 use std::path::Path;
@@ -55,6 +56,9 @@ pub struct RowOf<'r> {
     pub group: Option<&'r str>,
 }
 
+/// Advice on a sequence of two classes or groups.
+const ONE_OF_EACH: &str = "A sequence is of one class and one group: give the rows of another one another id.";
+
 /// Sequences, put together row by row.
 #[derive(Clone, Debug, Default)]
 pub struct SequencesBuilder {
@@ -76,39 +80,44 @@ impl SequencesBuilder {
     /// Takes in a row; `values` are as many as there are features.
     ///
     /// # Errors
-    /// [`RowsProblem`]: a sequence or group without a name, a label that is not a class, another label or group than that
-    /// of the rows before in the same sequence, a sequence that comes back after another.
-    pub fn push(&mut self, values: &[f64], row: RowOf<'_>) -> Result<(), RowsProblem> {
+    /// A sequence or group without a name, a label that is not a class, another label or group than that of the rows before
+    /// in the same sequence, a sequence that comes back after another.
+    pub fn push(&mut self, values: &[f64], row: RowOf<'_>) -> Result<()> {
         for (what, name) in [("sequence", Some(row.sequence)), ("group", row.group)] {
             if name == Some("") {
-                return Err(RowsProblem::Nameless { what });
+                return Err(
+                    problem!("the {what} is missing").fix(format!("Give each row the {what} that it belongs to."))
+                );
             }
         }
         let number = self.built.len() + 1;
+        let name = row.sequence;
         let group = row.group.unwrap_or_default();
         match &self.last {
             Some([sequence, label]) if sequence == row.sequence => {
                 if label != row.label {
-                    let labels = [label.clone(), row.label.into()];
-                    return Err(RowsProblem::TwoLabels { sequence: row.sequence.into(), labels });
+                    let other = row.label;
+                    return Err(
+                        problem!("the sequence {name:?} has the labels {label:?} and {other:?}").fix(ONE_OF_EACH)
+                    );
                 }
                 let last = self.built.sequences.last_mut().filter(|_| row.group.is_some());
                 let own = last.and_then(|last| self.built.groups.get(last.group?));
                 if let Some(own) = own.filter(|own| *own != group) {
-                    let groups = [own.clone(), group.into()];
-                    return Err(RowsProblem::TwoGroups { sequence: row.sequence.into(), groups });
+                    return Err(
+                        problem!("the sequence {name:?} belongs to the groups {own:?} and {group:?}").fix(ONE_OF_EACH)
+                    );
                 }
             }
             _ => {
                 let count = self.built.sequences.len();
                 if self.seen.insert(row.sequence.into(), count).is_some() {
-                    return Err(RowsProblem::ComesBack { sequence: row.sequence.into() });
+                    return Err(problem!("the sequence {name:?} comes back after another one").fix(
+                        "Sort the rows by sequence, each in its order, or give each stretch of rows an id of its own.",
+                    ));
                 }
-                let class = class(&self.classes, row.label).ok_or_else(|| RowsProblem::Label {
-                    label: row.label.into(),
-                    row: number,
-                    known: self.classes.clone(),
-                })?;
+                let class = class(&self.classes, row.label)
+                    .ok_or_else(|| not_a_class(row.label, number, &self.classes.join(", ")))?;
                 let group = row.group.map(|name| {
                     *self.groups.entry(name.into()).or_insert_with(|| {
                         self.built.groups.push(name.into());
@@ -129,9 +138,9 @@ impl SequencesBuilder {
     /// The sequences.
     ///
     /// # Errors
-    /// [`RowsProblem::Empty`].
-    pub fn finish(self) -> Result<Sequences, RowsProblem> {
-        if self.built.sequences.is_empty() { Err(RowsProblem::Empty) } else { Ok(self.built) }
+    /// If there is no row.
+    pub fn finish(self) -> Result<Sequences> {
+        if self.built.sequences.is_empty() { Err(no_rows()) } else { Ok(self.built) }
     }
 }
 
@@ -140,7 +149,7 @@ impl Sequences {
     /// as by [`Rows::read`](super::Rows::read).
     ///
     /// # Errors
-    /// [`Kind::Io`](crate::error::Kind::Io); [`RowsProblem`] naming the line, as [`SequencesBuilder::push`], and for a column that is not there
+    /// [`Kind::Io`](crate::error::Kind::Io); with the line, errors of [`SequencesBuilder::push`], a column that is not there,
     /// or a cell that is not a number.
     pub fn read(
         path: &Path,
@@ -177,13 +186,13 @@ impl Sequences {
     ) -> Result<Self> {
         let position = |name: &str| {
             let found = header.iter().position(|column| *column == name);
-            found.ok_or_else(|| Error::variant_at(place(1), RowsProblem::NoColumn { name: name.into() }))
+            found.ok_or_else(|| no_column(name).at(place(1)))
         };
         let [label, group] = [names.label.map(&position).transpose()?, names.group.map(&position).transpose()?];
         let sequence = position(names.sequence)?;
         let others: Vec<usize> = [sequence].into_iter().chain(label).chain(group).collect();
         let features = features.into();
-        let matched = features.among(header, &others).map_err(|problem| Error::variant_at(place(1), problem))?;
+        let matched = features.among(header, &others).map_err(|error| error.at(place(1)))?;
         let mut builder = SequencesBuilder::new(features.count(), classes);
         let mut values = vec![0.0; features.count()];
         for record in records {
@@ -191,14 +200,14 @@ impl Sequences {
             let cell = |column: usize| record.get(column).map_or("", String::as_str);
             for (value, &column) in values.iter_mut().zip(&matched.columns) {
                 *value = number(cell(column)).ok_or_else(|| {
-                    let name = header.get(column).copied().unwrap_or_default().to_owned();
-                    Error::variant_at(place(line), RowsProblem::Number { column: name, text: cell(column).into() })
+                    let name = header.get(column).copied().unwrap_or_default();
+                    not_a_number(name, cell(column)).at(place(line))
                 })?;
             }
             let row = RowOf { label: label.map_or("0", cell), sequence: cell(sequence), group: group.map(cell) };
-            builder.push(&values, row).map_err(|problem| Error::variant_at(place(line), problem))?;
+            builder.push(&values, row).map_err(|error| error.at(place(line)))?;
         }
-        let built = builder.finish().map_err(|problem| Error::variant_at(place(1), problem))?;
+        let built = builder.finish().map_err(|error| error.at(place(1)))?;
         Ok(Self { by_position: matched.by_position, ..built })
     }
 

@@ -1,7 +1,6 @@
 //! CSV files, record by record, each with its line; no line is left out.
 
-use super::RowsProblem;
-use crate::error::{Error, Place, Result};
+use crate::error::{Error, Place, Result, problem};
 use std::path::{Path, PathBuf};
 
 /// A CSV file in memory.
@@ -17,7 +16,7 @@ impl Table {
     /// Reads a file; its first line is a header.
     ///
     /// # Errors
-    /// [`Kind::Io`](crate::error::Kind::Io), and [`RowsProblem`] if it is not text.
+    /// [`Kind::Io`](crate::error::Kind::Io), and if it is not text.
     pub(super) fn read(path: &Path) -> Result<Self> {
         let mut table = Self::without_header(path, "read the rows")?;
         table.has_header = true;
@@ -42,32 +41,35 @@ impl Table {
 
     /// The problem in the header, or another one that explains it: an empty file, or cells that something else than commas
     /// separates.
-    pub(super) fn in_header(&self, problem: RowsProblem) -> Error {
+    pub(super) fn in_header(&self, error: Error) -> Error {
         if self.header.iter().all(String::is_empty) {
-            return Error::variant_at(Place::file(&self.path), RowsProblem::Empty);
+            return no_rows().at(Place::file(&self.path));
         }
         let separator = match self.header.as_slice() {
             [only] => [';', '\t'].into_iter().find(|separator| only.contains(*separator)),
             _ => None,
         };
-        let problem = separator.map_or(problem, |separator| RowsProblem::Separator { separator });
-        Error::variant_at(Place::line(&self.path, 1), problem)
+        let explained = separator.map(|separator| {
+            problem!("its cells are separated by {:?}", separator.to_string())
+                .fix("Separate cells by commas, and write decimals with a point.")
+        });
+        explained.unwrap_or(error).at(Place::line(&self.path, 1))
     }
 
     /// The position of a column.
     ///
     /// # Errors
-    /// [`RowsProblem::NoColumn`].
+    /// If there is no such column.
     pub(super) fn column(&self, name: &str) -> Result<usize> {
         let found = self.header.iter().position(|column| column == name);
-        found.ok_or_else(|| self.in_header(RowsProblem::NoColumn { name: name.into() }))
+        found.ok_or_else(|| self.in_header(no_column(name)))
     }
 
     /// The records below the header, each with its line.
     ///
     /// # Errors
-    /// [`RowsProblem`] for one with another number of cells, or no text, and for an empty line above another one: it may be a row
-    /// with a missing value.
+    /// For one with another number of cells, or no text, and for an empty line above another one: it may be a row with a
+    /// missing value.
     pub(super) fn records(&self) -> impl Iterator<Item = Result<(u64, csv::StringRecord)>> {
         let mut lines = Lines { bytes: &self.bytes, at: 0, line: 1 };
         let mut reader = self.reader();
@@ -87,7 +89,9 @@ impl Table {
                     from = reader.position().byte();
                     Some(match lines.first(start) {
                         Ok(line) => Ok((line, record)),
-                        Err(line) => Err(Error::variant_at(Place::line(&self.path, line), RowsProblem::EmptyLine)),
+                        Err(line) => Err(problem!("the line is empty")
+                            .fix("Remove it; or write \"\" for a missing value of the only column.")
+                            .at(Place::line(&self.path, line))),
                     })
                 }
             }
@@ -96,13 +100,23 @@ impl Table {
 
     /// A problem of the CSV reader.
     fn wrong(&self, error: &csv::Error) -> Error {
+        let not_rows = |detail: &str| {
+            problem!("not rows of features as CSV: {detail}")
+                .fix("Give a header line with the features' names, then one row per line.")
+        };
         let problem = match error.kind() {
             csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
-                RowsProblem::Ragged { found: *len, wanted: *expected_len }
+                let cells = if *len == 1 { "cell" } else { "cells" };
+                problem!("it has {len} {cells}, where the header has {expected_len}").fix(
+                    "Give each row as many cells as there are names, with nothing between commas where a value is missing.",
+                )
             }
-            csv::ErrorKind::Utf8 { .. } if self.bytes.starts_with(b"PAR1") => RowsProblem::Parquet,
-            csv::ErrorKind::Utf8 { .. } => RowsProblem::NotRows { detail: "it is not UTF-8".into() },
-            _ => RowsProblem::NotRows { detail: error.to_string() },
+            csv::ErrorKind::Utf8 { .. } if self.bytes.starts_with(b"PAR1") => {
+                let instead = palpate_base::gone::instead(".parquet").unwrap_or_default();
+                not_rows("it is a Parquet file").fix(format!("Instead, {instead}."))
+            }
+            csv::ErrorKind::Utf8 { .. } => not_rows("it is not UTF-8"),
+            _ => not_rows(&error.to_string()),
         };
         let place = match error.position() {
             // From where the record before ended, which may be within the end of its line.
@@ -113,8 +127,18 @@ impl Table {
             }
             None => Place::file(&self.path),
         };
-        Error::variant_at(place, problem)
+        problem.at(place)
     }
+}
+
+/// A table without rows.
+pub(super) fn no_rows() -> Error {
+    problem!("it has no rows").fix("Give at least one row below the header.")
+}
+
+/// A column that was asked for and is not there.
+pub(super) fn no_column(name: &str) -> Error {
+    problem!("it has no column {name:?}").fix("Name one of the columns in the header.")
 }
 
 /// Lines of a text, counted once.

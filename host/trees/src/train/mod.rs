@@ -12,6 +12,7 @@ mod slopes;
 mod split;
 
 use crate::ensemble::{Output, Tree};
+use crate::error::{Error, Result, problem};
 use bins::Bins;
 use grow::{Grower, Grown};
 use rayon::prelude::*;
@@ -56,68 +57,35 @@ pub struct Parameters {
     pub base_margin: f32,
 }
 
-/// Reasons for which no trees are grown.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Failure {
-    /// Numbers of features, labels and weights that do not go with each other.
-    #[error("{rows} labels need as many rows of {columns} features, and as many weights if there are any")]
-    Shape {
-        /// Labels.
-        rows: usize,
-        /// Features of a row.
-        columns: usize,
-    },
-    /// A parameter out of its range.
-    #[error("{name} is not {allowed}")]
-    Parameter {
-        /// The parameter's name.
-        name: &'static str,
-        /// Values allowed.
-        allowed: &'static str,
-    },
-    /// A feature that is too large or not a number, a class that there is not, or a weight that is not above 0.
-    #[error("row {row} has a {what}")]
-    Row {
-        /// The row, counted from 0.
-        row: usize,
-        /// Description of the fault.
-        what: &'static str,
-    },
-    /// No threads could be had.
-    #[error("{0}")]
-    Threads(String),
-    /// The callback said so.
-    #[error("cancelled")]
-    Cancelled,
-}
-
 /// Trains on `rows` of `classes` classes, and calls `on_round` after each round, which may break off. Returns the trees in the
 /// order in which margins add them up, and before them each class's margin without any tree. With a number of `threads` a pool
 /// of so many is made; else the current one serves.
 ///
 /// # Errors
-/// [`Failure`].
+/// [`Kind::Cancelled`](crate::error::Kind::Cancelled) if the callback breaks off; for features, labels and weights whose
+/// numbers do not go with each other, a parameter out of its range, a feature that is too large, a label that is no class, a
+/// weight that is not above 0; if there are no threads.
 pub fn train(
     rows: Rows<'_>,
     classes: usize,
     parameters: &Parameters,
     threads: Option<usize>,
     on_round: &(dyn Fn() -> ControlFlow<()> + Sync),
-) -> Result<(Vec<f32>, Vec<Tree>), Failure> {
+) -> Result<(Vec<f32>, Vec<Tree>)> {
     rows.check(classes)?;
     parameters.check()?;
     let train = || boost(&rows, classes, parameters, on_round);
     let trees = match threads.map(|threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build()) {
         None => train(),
         Some(Ok(pool)) => pool.install(train),
-        Some(Err(error)) => Err(Failure::Threads(error.to_string())),
+        Some(Err(error)) => Err(Error::new(error.to_string())),
     };
     Ok((vec![parameters.base_margin; classes], trees?))
 }
 
 impl Parameters {
-    fn check(&self) -> Result<(), Failure> {
-        let refused = |name, allowed| Err(Failure::Parameter { name, allowed });
+    fn check(&self) -> Result<()> {
+        let refused = |name: &str, allowed: &str| Err(problem!("{name} is not {allowed}"));
         match self {
             _ if !(1..=16).contains(&self.depth) => refused("depth", "1 to 16"),
             _ if !(2..=65_536).contains(&self.bins) => refused("bins", "2 to 65536"),
@@ -132,14 +100,19 @@ impl Parameters {
 }
 
 impl Rows<'_> {
-    fn check(&self, classes: usize) -> Result<(), Failure> {
+    fn check(&self, classes: usize) -> Result<()> {
         let (rows, columns) = (self.labels.len(), self.columns);
         let features = rows.checked_mul(columns);
         let weights = self.weights.is_none_or(|weights| weights.len() == rows);
         if rows == 0 || rows > u32::MAX as usize || columns == 0 || features != Some(self.features.len()) || !weights {
-            return Err(Failure::Shape { rows, columns });
+            return Err(problem!(
+                "{rows} labels need as many rows of {columns} features, and as many weights if there are any"
+            ));
         }
-        let found = |row: Option<usize>, what| row.map_or(Ok(()), |row| Err(Failure::Row { row, what }));
+        let found = |row: Option<usize>, what: &str| match row {
+            None => Ok(()),
+            Some(row) => Err(problem!("row {row} has a {what}")),
+        };
         let bad = self.features.iter().position(|value| value.abs() > LARGEST);
         found(bad.map(|index| index / columns), "feature beyond ±1e38")?;
         found(self.labels.iter().position(|&label| label as usize >= classes), "label that is no class")?;
@@ -154,7 +127,7 @@ fn boost(
     classes: usize,
     parameters: &Parameters,
     on_round: &(dyn Fn() -> ControlFlow<()> + Sync),
-) -> Result<Vec<Tree>, Failure> {
+) -> Result<Vec<Tree>> {
     let bins = Bins::new(rows, parameters.bins);
     let outputs = if parameters.multi_output { classes } else { 1 };
     let score = Score { outputs, least: f64::from(parameters.min_child_weight), complete: bins.complete };
@@ -179,7 +152,7 @@ fn boost(
             output: if parameters.multi_output { Output::Each } else { Output::One(class) },
         }));
         if on_round().is_break() {
-            return Err(Failure::Cancelled);
+            return Err(Error::cancelled());
         }
     }
     Ok(trees)

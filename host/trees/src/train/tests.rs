@@ -204,7 +204,7 @@ fn the_callback_is_called_after_each_round_and_may_cancel() {
         let round = 1 + rounds.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
         if round == last { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    assert_eq!(train(case.rows(), 3, &EACH, Some(1), &|| after(2)).unwrap_err(), Failure::Cancelled);
+    assert_eq!(train(case.rows(), 3, &EACH, Some(1), &|| after(2)).unwrap_err(), Error::cancelled());
     assert_eq!(rounds.swap(0, std::sync::atomic::Ordering::Relaxed), 2);
     assert_eq!(train(case.rows(), 3, &EACH, None, &|| after(5)).unwrap().1.len(), 4);
 }
@@ -223,7 +223,7 @@ fn rows_that_cannot_be_learned_from_are_refused_by_number() {
     assert_eq!(fails(&|case| case.labels[4] = 3).to_string(), "row 4 has a label that is no class");
     for weight in [0.0, -1.0, f32::NAN, f32::INFINITY] {
         let failure = fails(&|case| case.weights.as_mut().unwrap()[9] = weight);
-        assert!(matches!(failure, Failure::Row { row: 9, .. }), "{failure}");
+        assert!(failure.what().starts_with("row 9 has a weight"), "{failure}");
     }
     let changes: [&dyn Fn(&mut Case); 4] = [
         &|case| case.columns = 0,
@@ -232,6 +232,6 @@ fn rows_that_cannot_be_learned_from_are_refused_by_number() {
         &|case| (case.features, case.labels, case.weights) = (Vec::new(), Vec::new(), None),
     ];
     for change in changes {
-        assert!(matches!(fails(change), Failure::Shape { .. }));
+        assert!(fails(change).what().contains("labels need as many rows"));
     }
 }

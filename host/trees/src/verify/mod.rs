@@ -10,7 +10,6 @@ mod score;
 pub mod together;
 mod values;
 
-pub use crate::rows::ClassDiffers;
 pub use candidate::Candidate;
 pub use estimate::Estimate;
 pub use reference::{bound, margins, unit};
@@ -18,8 +17,8 @@ pub use score::{Classes, Regression, RowsEvaluation, evaluate_rows};
 
 use crate::compile::bound_of;
 use crate::ensemble::{Ensemble, Threshold};
-use crate::error::{Result, RowsProblem};
-use crate::rows::{Encoder, Rows, ValueDiffers, generate, missing_text};
+use crate::error::{Error, Kind, Result, problem};
+use crate::rows::{Encoder, Rows, generate, missing_text};
 use different::first_different_tree;
 use palpate_base::progress::{self, Progress};
 use palpate_onboard::Model;
@@ -85,27 +84,75 @@ pub struct Verified {
     pub scaling: Option<(f64, usize)>,
 }
 
+/// A row for which the library predicts another value.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ValueDiffers {
+    /// The row, counted from 1.
+    pub row: usize,
+    /// The model's value and the library's.
+    pub values: [f64; 2],
+}
+
+/// A row that the library puts into another class.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ClassDiffers {
+    /// The row, counted from 1.
+    pub row: usize,
+    /// The model's class and the library's.
+    pub classes: [String; 2],
+    /// Distance between their margins in the library.
+    pub gap: f64,
+}
+
+/// Advice on margins to compare with.
+const RAW_SCORES: &str = "Give the library's raw scores, before the softmax or the logistic function: one column per output, or one for a binary model (its second class), in the order of the classes. XGBoost: `output_margin=True`; LightGBM: `raw_score=True`; CatBoost: `prediction_type=\"RawFormulaVal\"`; scikit-learn: `decision_function`, of forests `predict_proba`; onnxruntime: a model converted with `options={id(model): {\"raw_scores\": True}}`, of forests its probabilities.";
+
 impl Verified {
     /// Returns an error if differences are larger than the model states.
     ///
     /// # Errors
-    /// [`RowsProblem::Beyond`].
-    pub fn check(&self) -> Result<(), RowsProblem> {
+    /// The first difference that is not explained by the rounding that the model states.
+    pub fn check(&self) -> Result<()> {
         let bound = self.stated_bound;
-        let beyond = |whose, error, tree| Err(RowsProblem::Beyond { whose, error, bound, tree });
+        let beyond = |whose: &str, error: f64, tree: Option<&String>| {
+            let tree = tree.map_or_else(String::new, |tree| format!("; {tree}"));
+            Err(problem!(
+                "{whose} margins differ by up to {error:.3e}, more than the {bound:.3e} that the model states{tree}"
+            )
+            .fix(
+                "Check that the model was exported from this file, with the same --missing and --all-trees, and the \
+                     margins are the library's raw scores of these rows.",
+            ))
+        };
         let [is_beyond_ensemble, is_beyond_library] = self.is_beyond;
         if is_beyond_ensemble {
-            return beyond("the ensemble's", self.max_margin_error, self.first_tree.clone());
+            return beyond("the ensemble's", self.max_margin_error, self.first_tree.as_ref());
         }
         match self.library_max_margin_error {
-            Some(_) if self.are_probabilities => return Err(RowsProblem::Probabilities),
+            Some(_) if self.are_probabilities => {
+                return Err(
+                    problem!("the library's numbers look like probabilities, and margins are needed").fix(RAW_SCORES)
+                );
+            }
             Some(error) if is_beyond_library => return beyond("the library's", error, None),
             _ => {}
         }
         let rows = self.library_class_unexplained.filter(|&rows| rows > 0).or(self.library_values_unexplained);
         match (&self.first_class, &self.first_value, rows) {
-            (Some(first), _, Some(rows)) => Err(RowsProblem::Class { rows, first: first.clone() }),
-            (_, Some(first), Some(rows)) => Err(RowsProblem::Value { rows, first: first.clone() }),
+            (Some(ClassDiffers { row, classes: [own, theirs], gap }), _, Some(rows)) => Err(problem!(
+                "{rows} rows get another class than the library gives them, and the rounding that the model states does not \
+                 explain it: the first is row {row}, of {own:?}, and {theirs:?} by the library, whose margins of the two are \
+                 {gap:.3e} apart"
+            )
+            .fix("Export with `--leaf f32`, and check that the margins are the library's raw scores of these rows.")),
+            (_, Some(ValueDiffers { row, values: [own, theirs] }), Some(rows)) => Err(problem!(
+                "the library predicts other values for {rows} rows, farther away than the rounding that the model states, or \
+                 than a thousandth of what its trees add up to: the first is row {row}, of {own} instead of {theirs}"
+            )
+            .fix(
+                "Export with the leaves that `export` advises, if it notes how far values may be off; and check that the \
+                 predictions are those of these rows, by the very model of this file. `--link` sets another link at export.",
+            )),
             _ => Ok(()),
         }
     }
@@ -149,8 +196,8 @@ const BATCH: usize = 4096;
 /// Compares a model with its ensemble on `rows` and on rows made at every threshold, and with what `library` says of `rows`.
 ///
 /// # Errors
-/// [`RowsProblem`] if model, ensemble, rows and the library's answers do not belong together;
-/// [`Kind::Cancelled`](crate::error::Kind::Cancelled).
+/// If model, ensemble and rows do not belong together; [`Kind::Margins`] and [`Kind::Predictions`] if the library's answers do
+/// not belong to them; [`Kind::Cancelled`].
 pub fn verify(
     model: &Model<'_>,
     ensemble: &Ensemble,
@@ -159,13 +206,17 @@ pub fn verify(
     progress: &dyn Progress,
 ) -> Result<Verified> {
     if model.descriptor().is_some() || ensemble.schema().is_some() {
-        return Err(RowsProblem::ComputesFeatures.into());
+        return Err(computes_features());
     }
     let trees = usize::try_from(model.header().trees()).unwrap_or(usize::MAX);
     let own = [model.feature_count(), model.object_count(), trees];
     let of_ensemble = [ensemble.inputs.count(), ensemble.objects.len(), ensemble.trees.len()];
     if own != of_ensemble {
-        return Err(RowsProblem::OtherModel { model: own, ensemble: of_ensemble }.into());
+        let text = |[features, outputs, trees]: [usize; 3]| {
+            format!("{features} features, {outputs} outputs and {trees} trees")
+        };
+        return Err(problem!("the model has {}, the ensemble {}", text(own), text(of_ensemble))
+            .fix("Give the file that the model was exported from, and --all-trees if it was exported with that."));
     }
     let reference = Reference::new(ensemble, model);
     same_missing(ensemble, &reference)?;
@@ -227,6 +278,11 @@ pub fn verify(
     })
 }
 
+/// A model whose features nobody measures.
+fn computes_features() -> Error {
+    problem!("the model is not over rows of features").fix("Give a model that takes rows of features.")
+}
+
 /// Refuses a model that takes other numbers for missing values than the ensemble. The model's trees would go the ensemble's way in
 /// each row that is made, since those hold the ensemble's numbers alone.
 fn same_missing(ensemble: &Ensemble, reference: &Reference<'_>) -> Result<()> {
@@ -238,7 +294,8 @@ fn same_missing(ensemble: &Ensemble, reference: &Reference<'_>) -> Result<()> {
         return Ok(());
     }
     let text = |ends: Option<[i32; 2]>| missing_text(ends.map(|ends| ends.map(|end| encoder.value(0, end))));
-    Err(RowsProblem::OtherMissing { model: text(own), ensemble: text(theirs) }.into())
+    Err(problem!("missing values are {} in the model, {} in the ensemble", text(own), text(theirs))
+        .fix("Give the file that the model was exported from, and --missing as it was exported with."))
 }
 
 /// The values next to a threshold and at it: the nearest f32, or whole numbers of the feature's units.
@@ -314,7 +371,9 @@ fn compare_library(
     library: &[Vec<f64>],
 ) -> Result<OfLibrary> {
     if library.len() != rows.len() {
-        return Err(RowsProblem::MarginRows { margins: library.len(), rows: rows.len() }.into());
+        return Err(problem!("it has margins of {} rows, but there are {} rows", library.len(), rows.len())
+            .fix("Give one line of margins for each row, without a header.")
+            .as_kind(Kind::Margins));
     }
     let outputs = model.object_count();
     let prediction = model.prediction();
@@ -336,7 +395,9 @@ fn compare_library(
             _ if expected.len() == outputs => expected.clone(),
             _ => {
                 let found = expected.len();
-                return Err(RowsProblem::MarginColumns { row: number + 1, found, outputs }.into());
+                return Err(problem!("row {} has {found} margins for {outputs} outputs", number + 1)
+                    .fix(RAW_SCORES)
+                    .as_kind(Kind::Margins));
             }
         };
         error = error.max(largest_difference(&own, &expected));

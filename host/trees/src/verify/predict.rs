@@ -2,8 +2,9 @@
 
 use super::Candidate;
 use super::together::AT_ONCE;
-use crate::error::{Result, RowsProblem};
+use crate::error::Result;
 use crate::rows::Encoder;
+use crate::rows::check_columns;
 use palpate_onboard::predicted_value;
 use palpate_shared::format::Prediction;
 use rayon::prelude::*;
@@ -34,7 +35,7 @@ pub(super) fn class_by(margins: &[f64], prediction: &Prediction) -> usize {
 /// a chip, and gives the same bits.
 ///
 /// # Errors
-/// [`RowsProblem`] for a model that is not over rows, or rows of another number of features.
+/// For a model that is not over rows, or rows of another number of features.
 pub fn predict<V: Copy + Into<f64> + Sync>(
     candidate: Candidate<'_>,
     values: &[V],
@@ -46,11 +47,9 @@ pub fn predict<V: Copy + Into<f64> + Sync>(
         Candidate::Compiled(model) => (model.feature_count(), model.object_count()),
     };
     if !candidate.is_of_rows() {
-        return Err(RowsProblem::ComputesFeatures.into());
+        return Err(super::computes_features());
     }
-    if features != wanted {
-        return Err(RowsProblem::Columns { found: features, wanted, all: None }.into());
-    }
+    check_columns(features, wanted)?;
     let rows = values.par_chunks_exact(features).with_min_len(AT_ONCE / 16);
     Ok(match candidate {
         Candidate::Full(ensemble) => {

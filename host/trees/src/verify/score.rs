@@ -3,8 +3,9 @@
 use super::Candidate;
 use super::estimate::Estimate;
 use super::predict::{Predicted, predict};
-use crate::error::{Result, RowsProblem};
+use crate::error::{Result, problem};
 use crate::rows::Rows;
+use crate::rows::{check_columns, not_a_class};
 use std::collections::BTreeMap;
 
 /// Results of a model on labeled rows.
@@ -47,32 +48,31 @@ pub struct Regression {
 /// Compares a model's answers with the rows' labels: names of classes or their numbers, or for one output numbers.
 ///
 /// # Errors
-/// [`RowsProblem`] for a model that is not over rows, rows of another number of features, and labels that are none.
+/// For a model that is not over rows, rows of another number of features, and labels that are none.
 pub fn evaluate_rows(candidate: Candidate<'_>, rows: &Rows) -> Result<RowsEvaluation> {
     let (features, names) = match candidate {
         Candidate::Full(ensemble) => (ensemble.inputs.count(), ensemble.objects.clone()),
         Candidate::Compiled(model) => (model.feature_count(), crate::compile::names(model)),
     };
     if !candidate.is_of_rows() {
-        return Err(RowsProblem::ComputesFeatures.into());
+        return Err(super::computes_features());
     }
-    if features != rows.features {
-        return Err(RowsProblem::Columns { found: rows.features, wanted: features, all: None }.into());
-    }
+    check_columns(rows.features, features)?;
     let predicted = predict(candidate, &rows.values, rows.features, false)?;
     let label = |row: usize| rows.labels.get(row).map_or("", String::as_str);
-    let wrong = |row: usize, known: &[String]| RowsProblem::Label {
-        label: label(row).into(),
-        row: row + 1,
-        known: known.to_vec(),
-    };
+    let wrong = |row: usize, known: &str| not_a_class(label(row), row + 1, known);
     let classes = match predicted {
         Predicted::Classes(classes) => classes,
-        Predicted::Values(_) if names.len() > 1 => return Err(RowsProblem::Targets { targets: names.len() }.into()),
+        Predicted::Values(_) if names.len() > 1 => {
+            return Err(problem!("the model has {} targets, and a row has one label", names.len()).fix(
+                "Compare the values that `palpate recognize --features` prints for each row, or `palpate verify` with the \
+                 library's margins.",
+            ));
+        }
         Predicted::Values(values) => {
             let (mut absolute, mut squares) = (0.0, 0.0);
             for (row, &value) in values.iter().enumerate() {
-                let truth: f64 = label(row).parse().map_err(|_| wrong(row, &["numbers".into()]))?;
+                let truth: f64 = label(row).parse().map_err(|_| wrong(row, "numbers"))?;
                 let difference = f64::from(value) - truth;
                 absolute += difference.abs();
                 squares += difference * difference;
@@ -85,7 +85,7 @@ pub fn evaluate_rows(candidate: Candidate<'_>, rows: &Rows) -> Result<RowsEvalua
     };
     let mut confusion = vec![vec![0; names.len()]; names.len()];
     for (row, &class) in classes.iter().enumerate() {
-        let truth = crate::rows::class(&names, label(row)).ok_or_else(|| wrong(row, &names))?;
+        let truth = crate::rows::class(&names, label(row)).ok_or_else(|| wrong(row, &names.join(", ")))?;
         confusion[truth][class] += 1;
     }
     let right: usize = (0..names.len()).map(|class| confusion[class][class]).sum();

@@ -1,10 +1,11 @@
 //! A model's classes and values compared with the output of the library's own `predict`.
 
 use super::reference::{Reference, Rounding, margins};
+use super::{ClassDiffers, ValueDiffers};
 use crate::compile::bound_of;
 use crate::ensemble::TOLERATED;
-use crate::error::{Result, RowsProblem};
-use crate::rows::{ClassDiffers, Rows, ValueDiffers, class};
+use crate::error::{Error, Kind, Result, problem};
+use crate::rows::{Rows, class, some};
 use palpate_onboard::Model;
 use palpate_shared::format::{Link, Prediction};
 
@@ -21,6 +22,15 @@ pub(super) struct OfPredictions {
     pub(super) first_value: Option<ValueDiffers>,
 }
 
+/// Predictions that are not what the library's `predict` says.
+fn wrong_values(what: &str) -> Error {
+    Error::new(what).as_kind(Kind::Predictions).fix(
+        "Give what the library's `predict` says of each row: a class, or the value of a regression, a column for each of \
+         several targets. Where it gives probabilities (XGBoost's and LightGBM's boosters), give the class with the largest \
+         one, of two classes the second one above 0.5.",
+    )
+}
+
 /// Compares the given rows' classes or values with the library's.
 pub(super) fn compare(
     model: &Model<'_>,
@@ -29,7 +39,10 @@ pub(super) fn compare(
     library: &[Vec<String>],
 ) -> Result<OfPredictions> {
     if library.len() != rows.len() {
-        return Err(RowsProblem::ValueRows { values: library.len(), rows: rows.len() }.into());
+        let (values, rows) = (library.len(), rows.len());
+        return Err(problem!("it has predictions of {values} rows, but there are {rows} rows")
+            .fix("Give one line for each row, without a header.")
+            .as_kind(Kind::Predictions));
     }
     let outputs = model.object_count();
     let is_value = outputs == 1 || model.prediction().targets;
@@ -41,7 +54,8 @@ pub(super) fn compare(
     let allowed: Vec<f64> = reach.iter().enumerate().filter(|_| is_value).map(allowed).collect();
     for (number, (row, said)) in (1..).zip(rows.iter().zip(library)) {
         if said.len() != wanted {
-            return Err(RowsProblem::ValueColumns { row: number, found: said.len(), wanted }.into());
+            let (found, are) = (said.len(), if wanted == 1 { "is" } else { "are" });
+            return Err(wrong_values(&format!("row {number} has {found} predictions, where {wanted} {are} needed")));
         }
         if is_value {
             values(model, reference, (number, row), (said, &allowed), &mut found)?;
@@ -61,7 +75,10 @@ fn classes(
 ) -> Result<()> {
     let names = crate::compile::names(model);
     let expected = class(&names, said);
-    let unknown = || RowsProblem::ValueText { text: said.into(), row: number, known: names.clone() };
+    let unknown = || {
+        let known = some(&names);
+        wrong_values(&format!("the prediction {said:?} of row {number} is none of the model's classes: {known}"))
+    };
     let expected = expected.ok_or_else(unknown)?;
     let encoded = reference.encoder.row(row);
     let own = model.predict_class(&encoded, &mut vec![0; model.object_count()]).unwrap_or_default();
@@ -102,8 +119,8 @@ fn values(
     let mut first = None;
     for (((text, &own), margin), allowed) in said.iter().zip(&own).zip(margins(model, &encoded)).zip(allowed) {
         let own = f64::from(own);
-        let expected: f64 =
-            text.parse().map_err(|_| RowsProblem::ValueText { text: text.clone(), row: number, known: Vec::new() })?;
+        let wrong = |_| wrong_values(&format!("the prediction {text:?} of row {number} is no number"));
+        let expected: f64 = text.parse().map_err(wrong)?;
         let ends = [-1.0, 1.0].map(|sign| exact(prediction, margin + sign * allowed));
         let slack = of_value * ends[0].abs().max(ends[1].abs()) + f64::from(f32::MIN_POSITIVE);
         if !(ends[0] - slack..=ends[1] + slack).contains(&expected) {

@@ -5,7 +5,7 @@ use crate::fixtures::{assert_says, computed, leaf, split, stump};
 use palpate_trees::compile::Settings;
 use palpate_trees::ensemble::import::{Options, PartTree, Parts};
 use palpate_trees::ensemble::{Ensemble, Node, Output, check_names};
-use palpate_trees::error::{EnsembleProblem, NameProblem, TreeProblem};
+use palpate_trees::error::Error;
 use palpate_trees::shared::Descriptor;
 
 type Change = fn(&mut Ensemble);
@@ -21,12 +21,12 @@ fn changed(change: Change) -> Ensemble {
 }
 
 /// Error of saving a changed ensemble, which leaves no file.
-fn unsaved(change: Change) -> EnsembleProblem {
+fn unsaved(change: Change) -> Error {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("ensemble.json");
     let error = changed(change).save(&path).unwrap_err();
     assert!(error.to_string().contains("ensemble.json: ") && !path.exists(), "{error}");
-    error.problem::<EnsembleProblem>().unwrap_or_else(|| panic!("{error}")).clone()
+    error
 }
 
 fn root(ensemble: &mut Ensemble) -> &mut Node {
@@ -35,35 +35,34 @@ fn root(ensemble: &mut Ensemble) -> &mut Node {
 
 #[test]
 fn a_tree_that_contradicts_itself_is_neither_saved_nor_compiled() {
-    let infinite = TreeProblem::LeafValue { node: 2, value: f32::INFINITY };
-    let cases: [(Change, TreeProblem); 10] = [
-        (|e| e.trees[0].nodes.clear(), TreeProblem::NoNodes),
-        (|e| e.trees[0].output = Output::One(2), TreeProblem::Object { object: 2, objects: 2 }),
-        (|e| e.trees[0].output = Output::One(1), TreeProblem::LeafValues { node: 1, found: 2, wanted: 1 }),
-        (|e| *root(e) = leaf(&[]), TreeProblem::LeafValues { node: 0, found: 0, wanted: 2 }),
-        (|e| e.trees[0].nodes[2] = leaf(&[0.0, f32::INFINITY]), infinite),
-        (|e| *root(e) = split(0, 5.0, 9, 2), TreeProblem::Child { node: 0, side: "left", child: 9, nodes: 3 }),
-        (|e| *root(e) = split(0, 5.0, 1, 7), TreeProblem::Child { node: 0, side: "right", child: 7, nodes: 3 }),
-        (|e| *root(e) = split(0, 5.0, 0, 2), TreeProblem::ReachedTwice { node: 0 }),
-        (|e| *root(e) = split(2, 5.0, 1, 2), TreeProblem::Feature { node: 0, feature: 2, features: 2 }),
-        (|e| *root(e) = split(0, f32::NAN, 1, 2), TreeProblem::Threshold { node: 0, threshold: f32::NAN }),
+    let cases: [(Change, &str); 10] = [
+        (|e| e.trees[0].nodes.clear(), "it has no nodes"),
+        (|e| e.trees[0].output = Output::One(2), "it is for object 2 of 2"),
+        (|e| e.trees[0].output = Output::One(1), "leaf 1 has 2 values instead of 1"),
+        (|e| *root(e) = leaf(&[]), "leaf 0 has 0 values instead of 2"),
+        (|e| e.trees[0].nodes[2] = leaf(&[0.0, f32::INFINITY]), "leaf 2 has the value inf, which is not finite"),
+        (|e| *root(e) = split(0, 5.0, 9, 2), "node 0: its left child 9 is not one of 3 nodes"),
+        (|e| *root(e) = split(0, 5.0, 1, 7), "node 0: its right child 7 is not one of 3 nodes"),
+        (|e| *root(e) = split(0, 5.0, 0, 2), "node 0 is reached twice: the tree has a cycle or a shared branch"),
+        (|e| *root(e) = split(2, 5.0, 1, 2), "node 0: it splits on feature 2, but there are 2"),
+        (|e| *root(e) = split(0, f32::NAN, 1, 2), "node 0: its threshold NaN is not finite"),
     ];
     for (change, problem) in cases {
-        // As text, since a threshold that is no number is not equal to itself.
-        let expected = format!("Tree {{ tree: 0, problem: {problem:?} }}");
-        assert_eq!(format!("{:?}", unsaved(change)), expected);
-        assert_eq!(format!("{:?}", refusal(&changed(change), &Settings::default())), expected);
+        let (unsaved, refused) = (unsaved(change), refusal(&changed(change), &Settings::default()));
+        assert_eq!(unsaved.what(), format!("tree 0: {problem}"));
+        assert_eq!(unsaved.remedy(), "The ensemble is damaged or was changed by hand; train or export it again.");
+        assert_eq!(refused.what(), format!("cannot compile the ensemble: tree 0: {problem}"));
+        assert_eq!(refused.remedy(), "Train it again, or check the program that wrote it.");
     }
 }
 
 #[test]
 fn saving_an_ensemble_made_by_hand_that_contradicts_itself_is_an_error_and_no_panic() {
-    let twice = EnsembleProblem::Tree { tree: 0, problem: TreeProblem::ReachedTwice { node: 1 } };
-    assert_eq!(unsaved(|e| *root(e) = split(0, 5.0, 1, 1)), twice);
-    assert_eq!(unsaved(|e| e.trees.clear()), EnsembleProblem::NoTrees);
-    let margins = EnsembleProblem::BaseMargins { found: 1, objects: 2 };
-    assert_eq!(unsaved(|e| e.base_margins = vec![0.0, f32::NAN]), margins);
-    assert_eq!(unsaved(|e| e.objects.truncate(1)), EnsembleProblem::ObjectCount { count: 1 });
+    assert_says(unsaved(|e| *root(e) = split(0, 5.0, 1, 1)), &["tree 0: node 1 is reached twice"]);
+    assert_says(unsaved(|e| e.trees.clear()), &["it has no trees"]);
+    let margins = "it has 1 finite base margins for 2 objects";
+    assert_says(unsaved(|e| e.base_margins = vec![0.0, f32::NAN]), &[margins]);
+    assert_says(unsaved(|e| e.objects.truncate(1)), &["it names 1 objects"]);
 }
 
 #[test]
@@ -80,14 +79,13 @@ fn a_saved_ensemble_is_read_as_it_was_where_its_schema_is_known() {
 #[test]
 fn names_that_no_file_or_model_can_hold_are_refused() {
     for (name, why) in [
-        ("", NameProblem::Empty),
-        ("fo\trk", NameProblem::Control),
-        ("fork\n", NameProblem::Control),
-        ("bowl", NameProblem::Twice),
-        (&"x".repeat(256), NameProblem::Long),
+        ("", "an object has an empty name"),
+        ("fo\trk", "the object's name \"fo\\trk\" has a control character in it"),
+        ("fork\n", "the object's name \"fork\\n\" has a control character in it"),
+        ("bowl", "it has the object \"bowl\" twice"),
+        (&"x".repeat(256), "xx\" has more than 255 bytes"),
     ] {
-        let problem = check_names(&["bowl".into(), name.into()]).unwrap_err();
-        assert_eq!(problem, EnsembleProblem::ObjectName { name: name.into(), why });
+        assert_says(check_names(&["bowl".into(), name.into()]).unwrap_err(), &[why, "Use 2 to 256 different names"]);
     }
     check_names(&["große Schüssel".into(), "x".repeat(255)]).unwrap();
     assert!(check_names(&vec!["x".into(); 257]).is_err());
@@ -127,22 +125,16 @@ fn at_or_below_the_threshold_is_left_for_every_number() {
 
 #[test]
 fn trees_that_contradict_themselves_are_refused() {
-    let column = TreeProblem::Column { column: "right", found: 2, wanted: 3 };
     for (tree, problem) in [
-        (PartTree { right: vec![2, -1], ..part() }, column),
-        (PartTree { left: vec![0, -1, -1], ..part() }, TreeProblem::ReachedTwice { node: 0 }),
-        (
-            PartTree { right: vec![3, -1, -1], ..part() },
-            TreeProblem::Child { node: 0, side: "right", child: 3, nodes: 3 },
-        ),
-        (PartTree { feature: vec![1, 0, 0], ..part() }, TreeProblem::Feature { node: 0, feature: 1, features: 1 }),
-        (PartTree { output: Some(1), ..part() }, TreeProblem::Object { object: 1, objects: 1 }),
-        (PartTree::default(), TreeProblem::NoNodes),
+        (PartTree { right: vec![2, -1], ..part() }, "right has 2 entries instead of 3"),
+        (PartTree { left: vec![0, -1, -1], ..part() }, "node 0 is reached twice"),
+        (PartTree { right: vec![3, -1, -1], ..part() }, "node 0: its right child 3 is not one of 3 nodes"),
+        (PartTree { feature: vec![1, 0, 0], ..part() }, "node 0: it splits on feature 1, but there are 1"),
+        (PartTree { output: Some(1), ..part() }, "it is for object 1 of 1"),
+        (PartTree { threshold: vec![f64::NAN, 0.0, 0.0], ..part() }, "node 0: its threshold NaN is not finite"),
+        (PartTree { output: Some(0), ..PartTree::default() }, "it has no nodes"),
     ] {
-        let tree = if tree.left.is_empty() { PartTree { output: Some(0), ..tree } } else { tree };
-        assert_eq!(parts(tree).into_ensemble(None), Err(EnsembleProblem::Tree { tree: 0, problem }));
+        let error = parts(tree).into_ensemble(None).unwrap_err();
+        assert!(error.what().starts_with(&format!("tree 0: {problem}")), "{error}");
     }
-    let nan = PartTree { threshold: vec![f64::NAN, 0.0, 0.0], ..part() };
-    let error = parts(nan).into_ensemble(None).unwrap_err();
-    assert!(matches!(error, EnsembleProblem::Tree { problem: TreeProblem::Threshold { node: 0, .. }, .. }), "{error}");
 }

@@ -1,13 +1,13 @@
 //! Compiling by hand-made ensembles: layouts, exactness, what the header says, and what is refused.
 
-use crate::fixtures::{leaf, of_one_value, of_two_objects, split, stump};
+use crate::fixtures::{assert_says, leaf, of_one_value, of_two_objects, split, stump};
 use palpate_base::with;
-use palpate_onboard::{ModelError, Stopping};
+use palpate_onboard::Stopping;
 use palpate_trees::compile::{
     Compiled, CompiledModel, Layout, Leaf, Restated, Settings, compile, compile_within, names, open, restate,
 };
 use palpate_trees::ensemble::{Ensemble, Inputs, Node, Output, Tree};
-use palpate_trees::error::{CompileProblem, Kind, TreeProblem, Variant};
+use palpate_trees::error::{Error, Kind};
 use palpate_trees::shared::format::f32_key;
 use palpate_trees::shared::{Descriptor, MISSING_FEATURE};
 
@@ -26,10 +26,9 @@ fn settings_of(leaf: Leaf) -> Settings {
     with!(Settings::default(), leaf)
 }
 
-/// The problem of an ensemble that is not compiled.
-pub(crate) fn refusal(ensemble: &Ensemble, settings: &Settings) -> CompileProblem {
-    let error = compile(ensemble, settings).unwrap_err();
-    error.problem::<CompileProblem>().unwrap_or_else(|| panic!("{error}")).clone()
+/// Error of an ensemble that is not compiled.
+pub(crate) fn refusal(ensemble: &Ensemble, settings: &Settings) -> Error {
+    compile(ensemble, settings).unwrap_err()
 }
 
 /// Name of the setting that was refused.
@@ -103,9 +102,8 @@ fn models_of_300_leaves_300_columns_and_70_000_thresholds_compile_or_say_what_to
         }
     }
     let stumps = (0..70_000).map(|n| vec![split(n % 8, n as f32, 1, 2), leaf(&[0.01, 0.0]), leaf(&[0.0, 0.01])]);
-    let problem = refusal(&of_two_objects(Descriptor::Oriented, stumps.collect()), &settings_of(Leaf::F32));
-    assert_eq!(problem, CompileProblem::TooManyThresholds { thresholds: 70_000 });
-    assert!(problem.fix().contains("Round the features"), "{problem}: {}", problem.fix());
+    let refused = refusal(&of_two_objects(Descriptor::Oriented, stumps.collect()), &settings_of(Leaf::F32));
+    assert_says(refused, &["the ensemble has 70000 different thresholds", "Round the features"]);
 }
 
 #[test]
@@ -196,16 +194,17 @@ fn objects_margins_depths_and_names_that_no_model_can_have_are_refused_by_what_i
         e.objects.clear();
         e.base_margins.clear();
     };
-    let too_deep = CompileProblem::Tree { tree: 0, problem: TreeProblem::TooDeep { most: 256 } };
-    assert_eq!(refused(|e| e.objects.push("cup".into())), CompileProblem::Objects { objects: 3, base_margins: 2 });
-    assert_eq!(refused(none), CompileProblem::Objects { objects: 0, base_margins: 0 });
-    assert_eq!(refused(|e| e.trees[0].nodes = chain(257, |_| 0)), too_deep);
-    match refused(|e| e.trees[0].nodes[2] = leaf(&[0.0, 1e5])) {
-        CompileProblem::MarginRange { of, largest, .. }
-            if of.starts_with("the object ") && (1e5..1.1e5).contains(&f64::from(largest)) => {}
-        other => panic!("{other:?}"),
-    }
-    assert_eq!(refused(|e| e.objects[0] = "x".repeat(256)), CompileProblem::NameTooLong { name: "x".repeat(256) });
+    assert_says(refused(|e| e.objects.push("cup".into())), &["an ensemble of 3 objects and 2 base margins"]);
+    assert_says(refused(none), &["an ensemble of 0 objects and 0 base margins"]);
+    let too_deep = "cannot compile the ensemble: tree 0: it is deeper than 256 splits. Train it again";
+    assert_says(refused(|e| e.trees[0].nodes = chain(257, |_| 0)), &[too_deep]);
+    let too_large = refused(|e| e.trees[0].nodes[2] = leaf(&[0.0, 1e5]));
+    assert_says(
+        too_large,
+        &["the margin of the object ", "(the largest single value is 1e5)", "beyond the 16384 that"],
+    );
+    let long = "x".repeat(256);
+    assert_says(refused(|e| e.objects[0] = "x".repeat(256)), &[&format!("the name {long:?} is too long for a model")]);
 }
 
 #[test]
@@ -225,10 +224,12 @@ fn thresholds_that_fall_together_when_rounded_are_refused_by_their_feature() {
     let seconds: Vec<Vec<Node>> = (0..9)
         .map(|number| vec![split(0, number as f32 * 0.05 - 0.2, 1, 2), leaf(&[1.0, 0.0]), leaf(&[0.0, 1.0])])
         .collect();
-    let problem = refusal(&of_two_objects(Descriptor::Curvature, seconds.clone()), &Settings::default());
-    let (of, whole, units) = ("things", "whole units", "units");
-    let (feature, thresholds, rounded, example) = ("curvature", 9, 2, -0.2);
-    assert_eq!(problem, CompileProblem::Thresholds { feature, thresholds, rounded, example, of, whole, units });
+    let refused = refusal(&of_two_objects(Descriptor::Curvature, seconds.clone()), &Settings::default());
+    assert_says(
+        refused,
+        &["the threshold -0.2 of curvature is neither whole nor halfway between two, and of 9 thresholds 2 stay \
+             different when rounded to whole units. Train on features in whole units: units. If it is not a model of things"],
+    );
     // Rows of features are compared as they are, fractions and all.
     let rows = Ensemble { inputs: Inputs::unnamed(2), ..of_two_objects(Descriptor::Curvature, seconds) };
     compile(&rows, &with!(Settings::default(), leaf = Leaf::F32)).unwrap();
@@ -255,11 +256,10 @@ fn a_compiled_model_opens_in_one_place_and_says_what_is_wrong_at_which_byte() {
     assert_eq!(read.model().checksum(), open(&compiled.bytes).unwrap().checksum());
     let cut = &compiled.bytes[..50];
     std::fs::write(&path, cut).unwrap();
-    let problem = CompileProblem::Model(ModelError::Length { expected: 96, found: 50 });
     let error = CompiledModel::read(&path).unwrap_err();
     assert!(error.to_string().contains("model.palpate: byte 50: the model is truncated"), "{error}");
     for error in [error, CompiledModel::from_bytes(cut.to_vec()).unwrap_err(), open(cut).map(|_| ()).unwrap_err()] {
-        assert_eq!(error.problem(), Some(&problem));
+        assert_says(error, &["the model is truncated: 50 bytes of 96. Copy the model again"]);
     }
 }
 
@@ -278,9 +278,8 @@ fn what_fits_a_budget_is_as_exact_as_there_is_room_for() {
         let compiled = compile_within(&ensemble, &settings, most).unwrap();
         assert!(compiled.bytes.len() <= most && leaf_of(&compiled) == leaf, "{most}");
     }
-    let problem = compile_within(&ensemble, &settings, i8 - 1).unwrap_err().problem::<CompileProblem>().cloned();
-    let over = CompileProblem::OverBudget { bytes: i8, most: i8 - 1 };
-    assert_eq!(problem, Some(over));
+    let refused = compile_within(&ensemble, &settings, i8 - 1).unwrap_err();
+    assert_says(refused, &[&format!("the model has {i8} bytes at least, more than the {} that fit", i8 - 1)]);
 }
 
 /// Trees of three splits over eight features, whose leaves are taken from the start of a sequence.

@@ -7,15 +7,14 @@ use super::draft::{Draft, DraftTree};
 use super::draft_node::DraftNode;
 use super::options::CATEGORIES;
 use super::set::Set;
-use super::unsupported;
+use crate::ensemble::check::no_trees;
 use crate::ensemble::{Ensemble, Output, Probability, Threshold};
-use crate::error::EnsembleProblem;
+use crate::error::{Error, Result, problem};
 use palpate_shared::format::Link;
 use serde::Deserialize;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
-
-type Result<T, E = EnsembleProblem> = std::result::Result<T, E>;
+use std::fmt::Display;
 
 /// CatBoost's own limit.
 const MAX_DEPTH: usize = 16;
@@ -149,13 +148,13 @@ impl Test {
     }
 }
 
-fn damaged(what: impl Into<String>) -> EnsembleProblem {
-    EnsembleProblem::Damaged { kind: "CatBoost JSON", what: what.into() }
+fn damaged(what: impl Display) -> Error {
+    super::damaged("CatBoost JSON", what)
 }
 
 /// Reads CatBoost's JSON.
 pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
-    let document: Document = serde_json::from_slice(bytes).map_err(|error| damaged(error.to_string()))?;
+    let document: Document = serde_json::from_slice(bytes).map_err(damaged)?;
     let info = &document.features_info;
     let others = [&info.categorical_features, &info.text_features, &info.embedding_features];
     let others = others.into_iter().flatten();
@@ -180,12 +179,10 @@ pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
     let is_multiclass = matches!(loss, "MultiClass" | "MultiClassOneVsAll") || (loss.is_empty() && classes.len() > 2);
     let are_targets = values > 1 && !is_multiclass;
     if are_targets && !loss.starts_with("MultiRMSE") {
-        return Err(unsupported(
-            format!(
-                "it has {values} outputs that are neither classes nor targets of a regression (its loss is {loss})"
-            ),
-            "Train a model for each.",
-        ));
+        return Err(problem!(
+            "it has {values} outputs that are neither classes nor targets of a regression (its loss is {loss})"
+        )
+        .fix("Train a model for each."));
     }
     let is_binary = values == 1 && (classes.len() == 2 || matches!(loss, "Logloss" | "CrossEntropy"));
     let first = usize::from(is_binary);
@@ -241,13 +238,11 @@ fn check_threshold(stated: &Value) -> Result<()> {
     if stated.is_null() || text.parse() == Ok(0.5) {
         return Ok(());
     }
-    Err(unsupported(
-        format!(
-            "it has the probability threshold {text} for its second class, and a model here gives the class with the greatest \
-             margin"
-        ),
-        "Call `set_probability_threshold(0.5)` before saving it, and compare posteriors yourself.",
-    ))
+    Err(problem!(
+        "it has the probability threshold {text} for its second class, and a model here gives the class with the greatest \
+         margin"
+    )
+    .fix("Call `set_probability_threshold(0.5)` before saving it, and compare posteriors yourself."))
 }
 
 fn class_names(params: &Value) -> Vec<String> {
@@ -263,7 +258,7 @@ fn values_per_leaf(oblivious: &[Oblivious], trees: &[Branch]) -> Result<usize> {
         let values = values.map(|leaves| tree.leaf_values.len() / leaves).filter(|&values| values > 0);
         return values.ok_or_else(|| damaged("tree 0: leaf_values has another length than its splits ask for"));
     }
-    let Some(mut branch) = trees.first() else { return Err(EnsembleProblem::NoTrees) };
+    let Some(mut branch) = trees.first() else { return Err(no_trees()) };
     loop {
         match (&branch.value, &branch.left) {
             (Some(OneOrEach::One(_)), _) => return Ok(1),
@@ -302,18 +297,18 @@ impl Reader<'_> {
         let Some(index) = index else {
             let others = &self.info.categorical_features;
             let names: Vec<&str> = others.iter().map(|feature| feature.feature_id.as_str()).collect();
-            let (what, way) = match split.split_type.as_str() {
-                "OnlineCtr" => (
-                    format!("tree {tree} splits on statistics of the target by category ({})", names.join(", ")),
-                    "Train with one_hot_max_size at least as large as the number of categories of a feature (at most 255), and \
-                     max_ctr_complexity=1.",
+            return Err(match split.split_type.as_str() {
+                "OnlineCtr" => problem!(
+                    "tree {tree} splits on statistics of the target by category ({})",
+                    names.join(", ")
+                )
+                .fix(
+                    "Train with one_hot_max_size at least as large as the number of categories of a feature (at most \
+                         255), and max_ctr_complexity=1.",
                 ),
-                other => (
-                    format!("tree {tree} has splits of another kind ({other})"),
-                    "Train on numbers, or on categories with one_hot_max_size.",
-                ),
-            };
-            return Err(unsupported(what, way));
+                other => problem!("tree {tree} has splits of another kind ({other})")
+                    .fix("Train on numbers, or on categories with one_hot_max_size."),
+            });
         };
         let feature = self.info.float_features.get(index);
         let feature = feature.ok_or_else(|| damaged(format!("tree {tree}: it has no feature {index}")))?;
@@ -328,15 +323,13 @@ impl Reader<'_> {
         let feature = split.cat_feature_index.and_then(|index| self.info.categorical_features.get(index));
         let feature = feature.ok_or_else(|| damaged(format!("tree {tree}: its categorical feature does not exist")))?;
         let numbers = self.numbers.get(&hash).ok_or_else(|| {
-            unsupported(
-                format!(
-                    "tree {tree} asks for a category of feature {} ({:?}) that is no whole number within {} of 0",
-                    feature.flat_feature_index,
-                    feature.feature_id,
-                    city::MOST
-                ),
-                "Number the categories before training, from 0 on: a chip has no words.",
+            problem!(
+                "tree {tree} asks for a category of feature {} ({:?}) that is no whole number within {} of 0",
+                feature.flat_feature_index,
+                feature.feature_id,
+                city::MOST
             )
+            .fix("Number the categories before training, from 0 on: a chip has no words.")
         })?;
         Ok((feature.flat_feature_index, Test::Numbers(numbers.clone())))
     }

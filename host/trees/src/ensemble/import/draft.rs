@@ -5,9 +5,10 @@ use super::options::{default_names, named};
 use super::spelled_out::spelled_out;
 use super::votes;
 use crate::ensemble::{
-    Ensemble, Exact, Imported, Inputs, MAX_OBJECTS, Node, Output, Probability, Provenance, Threshold, Tree, columns,
+    Ensemble, Exact, Imported, Inputs, MAX_OBJECTS, Node, Output, Probability, Provenance, Threshold, Tree,
+    check::object_count, columns,
 };
-use crate::error::EnsembleProblem;
+use crate::error::Result;
 use palpate_shared::format::Prediction;
 use std::collections::BTreeMap;
 
@@ -47,14 +48,14 @@ pub(in crate::ensemble) struct DraftTree {
 
 impl Draft {
     /// The ensemble in f32, checked.
-    pub(super) fn finish(mut self, names: Option<&[String]>) -> Result<Ensemble, EnsembleProblem> {
+    pub(super) fn finish(mut self, names: Option<&[String]>) -> Result<Ensemble> {
         for (number, tree) in self.trees.iter_mut().enumerate() {
             let name = |feature: usize| self.features.get(feature).cloned().unwrap_or_default();
             tree.nodes = spelled_out(std::mem::take(&mut tree.nodes), number, name)?;
         }
         let outputs = self.base.len();
         if outputs > MAX_OBJECTS {
-            return Err(EnsembleProblem::ObjectCount { count: outputs });
+            return Err(object_count(outputs));
         }
         if self.names.is_empty() {
             self.names = default_names(outputs, self.prediction.targets);

@@ -6,27 +6,15 @@
 
 use super::draft::{Draft, DraftTree};
 use super::draft_node::DraftNode;
-use super::options::CATEGORIES;
+use super::options::{CATEGORIES, unknown_objective};
 use super::set::Set;
-use super::unsupported;
+use crate::ensemble::check::object_count;
 use crate::ensemble::{Ensemble, Output, Probability, Threshold};
-use crate::error::EnsembleProblem;
+use crate::error::{Error, Place, Result, problem};
 use palpate_shared::format::Link;
 use std::collections::BTreeMap;
-
-/// Reason why a file was refused, and the line.
-pub(super) struct Refused {
-    pub(super) line: Option<u64>,
-    pub(super) problem: EnsembleProblem,
-}
-
-impl From<EnsembleProblem> for Refused {
-    fn from(problem: EnsembleProblem) -> Self {
-        Self { line: None, problem }
-    }
-}
-
-type Result<T, E = Refused> = std::result::Result<T, E>;
+use std::fmt::Display;
+use std::path::Path;
 
 /// Zero, to LightGBM: everything up to this.
 const ZERO: f32 = 1e-35;
@@ -34,16 +22,16 @@ const ZERO: f32 = 1e-35;
 const MAX_GROWTH: usize = 16;
 
 /// `key=value` lines, each with its number.
-#[derive(Default)]
 struct Block<'a> {
+    path: &'a Path,
     line: u64,
     values: BTreeMap<&'a str, (u64, &'a str)>,
 }
 
 impl<'a> Block<'a> {
-    fn damaged(&self, key: &str, what: &str) -> Refused {
+    fn damaged(&self, key: &str, what: &str) -> Error {
         let line = self.values.get(key).map_or(self.line, |(line, _)| *line);
-        damaged(line, format!("{key} {what}"))
+        damaged(Place::line(self.path, line), format_args!("{key} {what}"))
     }
 
     fn text(&self, key: &str) -> Option<&'a str> {
@@ -67,17 +55,17 @@ impl<'a> Block<'a> {
     }
 }
 
-fn damaged(line: u64, what: String) -> Refused {
-    Refused { line: Some(line), problem: EnsembleProblem::Damaged { kind: "LightGBM text", what } }
+fn damaged(place: Place, what: impl Display) -> Error {
+    super::damaged("LightGBM text", what).at(place)
 }
 
-/// Reads LightGBM's text.
-pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
-    let text = std::str::from_utf8(bytes).map_err(|_| damaged(1, "it is not UTF-8".into()))?;
-    let (head, blocks) = blocks(text)?;
+/// Reads LightGBM's text; `path` is for errors only.
+pub(super) fn read(path: &Path, bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
+    let text = std::str::from_utf8(bytes).map_err(|_| damaged(Place::line(path, 1), "it is not UTF-8"))?;
+    let (head, blocks) = blocks(path, text)?;
     let outputs = head.count("num_tree_per_iteration")?;
     if outputs == 0 || outputs > 256 {
-        return Err(EnsembleProblem::ObjectCount { count: outputs }.into());
+        return Err(object_count(outputs));
     }
     let features = head.count("max_feature_idx")?.saturating_add(1);
     let own: Vec<String> = head.text("feature_names").unwrap_or_default().split(' ').map(String::from).collect();
@@ -116,7 +104,7 @@ pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
         let nodes = grower.nodes;
         draft.trees.push(DraftTree { nodes, output });
     }
-    Ok(draft.finish(names)?)
+    draft.finish(names)
 }
 
 /// The categories of each column that has some, as LightGBM's Python package states those of a pandas table below the trees: of all
@@ -143,8 +131,8 @@ fn names_of_categories(text: &str, head: &Block<'_>) -> BTreeMap<usize, Vec<Stri
 }
 
 /// The lines before the first tree, and those of each tree.
-fn blocks(text: &str) -> Result<(Block<'_>, Vec<Block<'_>>)> {
-    let mut head = Block::default();
+fn blocks<'a>(path: &'a Path, text: &'a str) -> Result<(Block<'a>, Vec<Block<'a>>)> {
+    let mut head = Block { path, line: 0, values: BTreeMap::new() };
     let mut trees: Vec<Block<'_>> = Vec::new();
     for (line, text) in (1..).zip(text.lines()) {
         let text = text.trim_end();
@@ -153,13 +141,14 @@ fn blocks(text: &str) -> Result<(Block<'_>, Vec<Block<'_>>)> {
         }
         let (key, value) = text.split_once('=').unwrap_or((text, ""));
         if key == "Tree" {
-            trees.push(Block { line, values: BTreeMap::new() });
+            trees.push(Block { path, line, values: BTreeMap::new() });
         } else if !key.is_empty() {
             let block = trees.last_mut().unwrap_or(&mut head);
             block.values.insert(key, (line, value));
         }
     }
-    Err(damaged(text.lines().count() as u64, "it ends before the line \"end of trees\"".into()))
+    let end = Place::line(path, text.lines().count() as u64);
+    Err(damaged(end, "it ends before the line \"end of trees\""))
 }
 
 /// The first tree's object: 1 for a binary model. Notes peculiarities of the objective; `rounds` are averaged.
@@ -174,7 +163,7 @@ fn objective(text: Option<&str>, outputs: usize, rounds: usize, draft: &mut Draf
         draft.probability = Probability::Unknown;
     }
     if outputs > 1 && !is_classes && name != "custom" {
-        return Err(EnsembleProblem::Objective { found: name.into(), of: None }.into());
+        return Err(unknown_objective(name, None));
     }
     if is_classes || name == "binary" {
         // Of these, and of no others, margins are evidence.
@@ -230,11 +219,8 @@ fn tree(block: &Block<'_>, number: usize, features: usize, names: &[String]) -> 
         return Err(block.damaged("num_leaves", "is 0"));
     }
     if block.text("is_linear").is_some_and(|text| text.trim() == "1") {
-        return Err(unsupported(
-            format!("tree {number} has linear functions of the features at its leaves"),
-            "Train with linear_tree=false.",
-        )
-        .into());
+        return Err(problem!("tree {number} has linear functions of the features at its leaves")
+            .fix("Train with linear_tree=false."));
     }
     let splits = leaves - 1;
     let selected: Vec<usize> = block.list("split_feature", splits)?;
@@ -347,14 +333,11 @@ impl Grower<'_> {
             self.split(split.clone(), to, &mut waiting);
             if self.nodes.len() > most {
                 let name = names.get(split.feature).map_or("", String::as_str);
-                return Err(unsupported(
-                    format!(
-                        "tree {number} takes zeros of features such as {name:?} as missing in so many places that it \
-                         would become {MAX_GROWTH} times as large"
-                    ),
-                    "Train with zero_as_missing=false, or with fewer leaves.",
+                return Err(problem!(
+                    "tree {number} takes zeros of features such as {name:?} as missing in so many places that it would \
+                     become {MAX_GROWTH} times as large"
                 )
-                .into());
+                .fix("Train with zero_as_missing=false, or with fewer leaves."));
             }
         }
         Ok(())

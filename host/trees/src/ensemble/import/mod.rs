@@ -35,9 +35,10 @@ pub use options::Options;
 pub use parts::{PartTree, Parts};
 
 use super::{Ensemble, xgboost};
-use crate::error::{EnsembleProblem, Error, Place, Result};
+use crate::error::{Error, Place, Result, problem};
 use options::MISSING_UNKNOWN;
 pub(crate) use options::asks;
+use std::fmt::Display;
 use std::path::Path;
 
 impl Ensemble {
@@ -46,8 +47,8 @@ impl Ensemble {
     /// features that the model computes; [`Options::schemas`] has those that can be read.
     ///
     /// # Errors
-    /// If the file cannot be read, is of no such kind, or has something in it that no compiled model can do
-    /// ([`EnsembleProblem`]): an unknown descriptor, or another number of features than it has; fewer than two objects
+    /// If the file cannot be read, is of no such kind, or has something in it that no compiled model can do:
+    /// an unknown descriptor, or another number of features than it has; fewer than two objects
     /// (over rows none) or more than 256, a name that is repeated, empty, too long or has control characters, or another
     /// number of classes; columns of unequal length; a child, feature or object out of range; a node that is reached
     /// twice (a cycle); a leaf that is not finite; categorical splits, or no trees at all. The error names the file, the
@@ -59,8 +60,8 @@ impl Ensemble {
     /// Reads an ensemble as [`load`](Self::load) does, with facts that the file does not state.
     ///
     /// # Errors
-    /// Errors of [`load`](Self::load); [`EnsembleProblem::Names`] if there are other names than outputs;
-    /// [`EnsembleProblem::Unsupported`] for a missing value of an ensemble that is not over rows.
+    /// Errors of [`load`](Self::load); if there are other names than outputs; for a missing value of an ensemble that is
+    /// not over rows.
     pub fn load_with(path: impl AsRef<Path>, options: &Options<'_>) -> Result<Self> {
         let path = path.as_ref();
         let bytes = std::fs::read(path).map_err(|source| Error::io(path, "read the ensemble", source))?;
@@ -75,7 +76,7 @@ impl Ensemble {
 /// # Errors
 /// Errors of [`Ensemble::load_with`], except for reading the file.
 pub fn read(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ensemble> {
-    let mut ensemble = read_as_it_is(path, bytes, options)?;
+    let mut ensemble = read_as_it_is(path, bytes, options).map_err(|error| error.in_file(path))?;
     if options.missing.is_some()
         && let Some(imported) = ensemble.origin.imported.as_mut()
     {
@@ -84,8 +85,9 @@ pub fn read(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ensemble
     if let Some(missing) = options.missing.filter(|missing| !missing.is_nan()) {
         let Some(imported) = ensemble.origin.imported.as_mut() else {
             let of = ensemble.schema().map_or("other features", |schema| schema.of);
-            let what = format!("it is over {of}, where no number stands for a missing contact");
-            return Err(Error::variant_at(Place::file(path), unsupported(what, "Leave the missing value out.")));
+            return Err(problem!("it is over {of}, where no number stands for a missing contact")
+                .fix("Leave the missing value out.")
+                .at(Place::file(path)));
         };
         imported.sentinel = Some([missing; 2]);
     }
@@ -94,33 +96,25 @@ pub fn read(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ensemble
 
 fn read_as_it_is(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ensemble> {
     let names = options.names;
-    let wrong = |problem| Error::variant_at(Place::file(path), problem);
     // The mark that Windows puts before a text.
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    match kind(bytes).map_err(wrong)? {
+    match kind(bytes)? {
         Kind::Json => match json_kind(bytes) {
-            JsonKind::CatBoost => catboost::read(bytes, names).map_err(wrong),
-            JsonKind::LightGbmDump => Err(wrong(unsupported(
-                "it is what LightGBM's dump_model wrote, which rounds numbers",
-                "Save the model with `booster.save_model(\"model.txt\")`.",
-            ))),
-            JsonKind::XgBoostDump => Err(wrong(unsupported(
-                "it is a list, as XGBoost's dump_model writes it, which lacks the starting values of the margins",
-                "Save the model with `booster.save_model(\"model.json\")`.",
-            ))),
+            JsonKind::CatBoost => catboost::read(bytes, names),
+            JsonKind::LightGbmDump => Err(problem!("it is what LightGBM's dump_model wrote, which rounds numbers")
+                .fix("Save the model with `booster.save_model(\"model.txt\")`.")),
+            JsonKind::XgBoostDump => Err(problem!(
+                "it is a list, as XGBoost's dump_model writes it, which lacks the starting values of the margins"
+            )
+            .fix("Save the model with `booster.save_model(\"model.json\")`.")),
             JsonKind::XgBoost => xgboost::from_json(path, bytes, options),
         },
         Kind::Ubjson => match ubjson::read(bytes) {
-            Ok(value) => xgboost::from_ubjson(path, &value, options),
-            Err(at) => Err(Error::variant_at(
-                Place::byte(path, at),
-                EnsembleProblem::Damaged { kind: "XGBoost UBJSON", what: "not UBJSON from here on".into() },
-            )),
+            Ok(value) => xgboost::from_ubjson(&value, options),
+            Err(at) => Err(damaged("XGBoost UBJSON", "not UBJSON from here on").at(Place::byte(path, at))),
         },
-        Kind::LightGbm => lightgbm::read(bytes, names).map_err(|refused| {
-            Error::variant_at(refused.line.map_or(Place::file(path), |line| Place::line(path, line)), refused.problem)
-        }),
-        Kind::Onnx => onnx::read(bytes, names).map_err(wrong),
+        Kind::LightGbm => lightgbm::read(path, bytes, names),
+        Kind::Onnx => onnx::read(bytes, names),
     }
 }
 
@@ -132,10 +126,10 @@ enum Kind {
 }
 
 /// Returns the kind of a file, by its first bytes.
-fn kind(bytes: &[u8]) -> Result<Kind, EnsembleProblem> {
+fn kind(bytes: &[u8]) -> Result<Kind> {
     let text = bytes.trim_ascii_start();
     let starts = |prefix: &[u8]| bytes.starts_with(prefix);
-    let refused = |what: &str, way: &str| Err(unsupported(what, way));
+    let refused = |what: &str, fix: &str| Err(Error::new(what).fix(fix));
     match bytes {
         // `{` and the length of the first key, in one of UBJSON's integers; or `{$` and `{#`, of typed objects.
         [b'{', b'i' | b'U' | b'I' | b'u' | b'l' | b'm' | b'L' | b'$' | b'#', ..] => Ok(Kind::Ubjson),
@@ -202,7 +196,8 @@ fn json_kind(bytes: &[u8]) -> JsonKind {
     }
 }
 
-/// A kind of file, or something in one, that is refused.
-fn unsupported(what: impl Into<String>, way: impl Into<String>) -> EnsembleProblem {
-    EnsembleProblem::Unsupported { what: what.into(), way: way.into() }
+/// A file of another library that contradicts itself.
+pub(super) fn damaged(kind: &str, what: impl Display) -> Error {
+    problem!("not a whole model in the format {kind}: {what}")
+        .fix("Save the model again with the library that trained it.")
 }

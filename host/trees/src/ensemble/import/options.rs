@@ -1,7 +1,7 @@
 //! Facts that files of other libraries do not state, and the names that they leave out.
 
 use crate::ensemble::Schema;
-use crate::error::EnsembleProblem;
+use crate::error::{Error, Result, problem};
 
 /// Facts that a file of another library does not state, or that a user wants otherwise.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -35,11 +35,15 @@ pub(in crate::ensemble) const CATEGORIES: &str = "Categories are the numbers tha
                                                   column their codes, from 0 on in the order of its categories.";
 
 /// A classifier of one class is no regression.
-pub(in crate::ensemble) fn one_class() -> EnsembleProblem {
-    EnsembleProblem::Unsupported {
-        what: "it has one class, and nothing to distinguish".into(),
-        way: "Train on two classes or more.".into(),
-    }
+pub(in crate::ensemble) fn one_class() -> Error {
+    problem!("it has one class, and nothing to distinguish").fix("Train on two classes or more.")
+}
+
+/// An objective whose margins have no known meaning; `of` says what features are of, if the model computes them.
+pub(in crate::ensemble) fn unknown_objective(found: &str, of: Option<&str>) -> Error {
+    let only = of.map_or_else(String::new, |of| format!("; a model of {of} with multi:softprob"));
+    problem!("its objective is {found}")
+        .fix(format!("Train with multi:softprob, binary:logistic or a regression of one target{only}."))
 }
 
 /// The names of outputs that have none: the labels 0, 1 and so on, or the value or targets of a regression.
@@ -52,10 +56,11 @@ pub(in crate::ensemble) fn default_names(outputs: usize, are_targets: bool) -> V
 }
 
 /// The given names, if there are some, instead of a file's own.
-pub(in crate::ensemble) fn named(given: Option<&[String]>, own: Vec<String>) -> Result<Vec<String>, EnsembleProblem> {
+pub(in crate::ensemble) fn named(given: Option<&[String]>, own: Vec<String>) -> Result<Vec<String>> {
     match given {
         None => Ok(own),
         Some(given) if given.len() == own.len() => Ok(given.to_vec()),
-        Some(given) => Err(EnsembleProblem::Names { names: given.len(), outputs: own.len() }),
+        Some(given) => Err(problem!("{} names were given for {} outputs", given.len(), own.len())
+            .fix("Give one name for each class, in the order of the labels.")),
     }
 }

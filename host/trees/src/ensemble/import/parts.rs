@@ -2,8 +2,8 @@
 
 use super::draft::{Draft, DraftTree};
 use super::draft_node::DraftNode;
-use crate::ensemble::{Ensemble, Output, Probability, Threshold};
-use crate::error::{EnsembleProblem, TreeProblem};
+use crate::ensemble::{Ensemble, Output, Probability, Threshold, faults};
+use crate::error::Result;
 use palpate_shared::format::Prediction;
 
 /// An ensemble in parts: what margins start from, and the trees that are added.
@@ -52,17 +52,15 @@ impl Parts {
     /// The ensemble: comparisons are exact for every f32, and how far margins can be from the f64 sums is computed.
     ///
     /// # Errors
-    /// [`EnsembleProblem`] for columns of unequal length, children and features out of range, a node that is reached
+    /// For columns of unequal length, children and features out of range, a node that is reached
     /// twice, and everything that [`Ensemble::check`] refuses.
-    pub fn into_ensemble(self, names: Option<&[String]>) -> Result<Ensemble, EnsembleProblem> {
+    pub fn into_ensemble(self, names: Option<&[String]>) -> Result<Ensemble> {
         let Self { kind, features, names: own, base, trees, notes, prediction, probability, compares_f64 } = self;
         let outputs = base.len();
         let trees = trees
             .into_iter()
             .enumerate()
-            .map(|(number, tree)| {
-                tree.draft(outputs).map_err(|problem| EnsembleProblem::Tree { tree: number, problem })
-            })
+            .map(|(number, tree)| tree.draft(outputs).map_err(|error| error.within(format_args!("tree {number}: "))))
             .collect::<Result<_, _>>()?;
         let draft = Draft { features, names: own, base, trees, kind, notes, ..Draft::default() };
         Draft { prediction, probability, compares_f64, ..draft }.finish(names)
@@ -70,7 +68,7 @@ impl Parts {
 }
 
 impl PartTree {
-    fn draft(&self, outputs: usize) -> Result<DraftTree, TreeProblem> {
+    fn draft(&self, outputs: usize) -> Result<DraftTree> {
         let nodes = self.left.len();
         let width = if self.output.is_some() { 1 } else { outputs };
         for (column, found, wanted) in [
@@ -81,7 +79,7 @@ impl PartTree {
             ("values", self.values.len(), nodes * width),
         ] {
             if found != wanted {
-                return Err(TreeProblem::Column { column, found, wanted });
+                return Err(faults::column(column, found, wanted));
             }
         }
         let index = |number: i64| usize::try_from(number).unwrap_or(usize::MAX);

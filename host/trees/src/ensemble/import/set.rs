@@ -1,7 +1,6 @@
 //! Sets of categories, as runs of values.
 
-use super::unsupported;
-use crate::error::EnsembleProblem;
+use crate::error::{Result, problem};
 
 /// The most categories of a set: LightGBM's text can state any number in a few bytes.
 const MAX_CATEGORIES: usize = 1 << 16;
@@ -21,15 +20,13 @@ impl Set {
     pub(in crate::ensemble) fn of_categories(
         categories: impl IntoIterator<Item = u32>,
         truncates_to_zero: bool,
-    ) -> Result<Self, EnsembleProblem> {
+    ) -> Result<Self> {
         let mut categories: Vec<u32> = categories.into_iter().collect();
         categories.sort_unstable();
         categories.dedup();
         if categories.len() > MAX_CATEGORIES {
-            return Err(unsupported(
-                format!("it splits by a set of {} categories", categories.len()),
-                "Train with fewer categories in a set: at most 65,536 are taken.",
-            ));
+            return Err(problem!("it splits by a set of {} categories", categories.len())
+                .fix("Train with fewer categories in a set: at most 65,536 are taken."));
         }
         let mut ends: Vec<f64> = Vec::new();
         for category in categories {

@@ -6,9 +6,8 @@
 
 use super::draft_node::DraftNode;
 use super::set::{BELOW_ZERO, Set};
-use super::unsupported;
 use crate::ensemble::Threshold;
-use crate::error::EnsembleProblem;
+use crate::error::{Error, Result, problem};
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
@@ -26,17 +25,17 @@ pub(in crate::ensemble) fn spelled_out(
     nodes: Vec<DraftNode>,
     tree: usize,
     name: impl Fn(usize) -> String,
-) -> Result<Vec<DraftNode>, EnsembleProblem> {
+) -> Result<Vec<DraftNode>> {
     let of_set = |node: &DraftNode| if let DraftNode::Set { feature, .. } = node { Some(*feature) } else { None };
     let Some(first) = nodes.iter().find_map(of_set) else { return Ok(nodes) };
-    let damaged = |what: String| unsupported(what, "Save the model again.");
+    let again = |error: Error| error.fix("Save the model again.");
     let mut writer =
         Writer { nodes: Vec::new(), waiting: Vec::new(), most: nodes.len().saturating_mul(MAX_GROWTH).max(ALWAYS) };
     let root = writer.reserve();
     writer.waiting.push(Waiting { from: 0, to: root, reaches: Reaches::default(), depth: 0 });
     while let Some(here) = writer.waiting.pop() {
         let node = nodes.get(here.from).filter(|_| here.depth <= nodes.len());
-        match node.ok_or_else(|| damaged(format!("tree {tree} has no node {}", here.from)))? {
+        match node.ok_or_else(|| again(problem!("tree {tree} has no node {}", here.from)))? {
             DraftNode::Leaf(values) => writer.put(here.to, DraftNode::Leaf(values.clone())),
             &DraftNode::Split { feature, threshold, missing_left, left, right } => {
                 let [left, right] = [left, right].map(|child| {
@@ -51,19 +50,19 @@ pub(in crate::ensemble) fn spelled_out(
                 let runs = Runs::of(set, reach, *missing_inside);
                 let is_small = writer.search(&runs, *feature, [*inside, *outside], &here);
                 is_small.ok_or_else(|| {
-                    unsupported(
-                        format!(
-                            "tree {tree} splits by sets of categories of {:?} that lie so far apart that it would become \
-                             {MAX_GROWTH} times as large",
-                            name(first)
-                        ),
+                    problem!(
+                        "tree {tree} splits by sets of categories of {:?} that lie so far apart that it would become \
+                         {MAX_GROWTH} times as large",
+                        name(first)
+                    )
+                    .fix(
                         "Train with fewer categories in a set (XGBoost's and LightGBM's max_cat_threshold), less depth, or \
                          rarer categories put together; number categories that behave alike one after the other.",
                     )
                 })?;
             }
         }
-        writer.check().ok_or_else(|| damaged(format!("tree {tree} has nodes without end")))?;
+        writer.check().ok_or_else(|| again(problem!("tree {tree} has nodes without end")))?;
     }
     Ok(writer.nodes)
 }

@@ -23,9 +23,10 @@ mod schema;
 mod trees;
 mod write;
 
+use super::import::damaged;
 use super::import::options::Options;
 use super::{Ensemble, Schema};
-use crate::error::{EnsembleProblem, Error, Place, Result};
+use crate::error::{Error, Place, Result, problem};
 use palpate_base::output;
 use schema::Document;
 use serde::Deserialize;
@@ -34,24 +35,22 @@ use std::path::Path;
 
 /// Reads XGBoost's JSON.
 pub(super) fn from_json(path: &Path, bytes: &[u8], options: &Options<'_>) -> Result<Ensemble> {
-    let wrong = |problem| Error::variant_at(Place::file(path), problem);
     let text = without_literals(bytes);
     let refused = |error| {
         let peek: Peek = serde_json::from_slice(&text).unwrap_or_default();
-        peek.problem().map_or_else(|| not_json(path, &error), wrong)
+        peek.problem().unwrap_or_else(|| not_json(path, &error))
     };
     let document: Document = serde_json::from_slice(&text).map_err(refused)?;
-    document.into_ensemble(options, "JSON").map_err(wrong)
+    document.into_ensemble(options, "JSON")
 }
 
 /// Reads XGBoost's UBJSON, which holds the same as its JSON.
-pub(super) fn from_ubjson(path: &Path, value: &serde_json::Value, options: &Options<'_>) -> Result<Ensemble> {
-    let wrong = |problem| Error::variant_at(Place::file(path), problem);
+pub(super) fn from_ubjson(value: &serde_json::Value, options: &Options<'_>) -> Result<Ensemble> {
     let refused = |error: serde_json::Error| {
-        let damaged = || EnsembleProblem::Damaged { kind: "XGBoost UBJSON", what: error.to_string() };
-        wrong(Peek::deserialize(value).unwrap_or_default().problem().unwrap_or_else(damaged))
+        let peek = Peek::deserialize(value).unwrap_or_default();
+        peek.problem().unwrap_or_else(|| damaged("XGBoost UBJSON", error))
     };
-    Document::deserialize(value).map_err(refused)?.into_ensemble(options, "UBJSON").map_err(wrong)
+    Document::deserialize(value).map_err(refused)?.into_ensemble(options, "UBJSON")
 }
 
 /// The booster of a document of any schema.
@@ -75,10 +74,15 @@ struct PeekBooster {
 
 impl Peek {
     /// A booster that has no trees, and so another schema.
-    fn problem(self) -> Option<EnsembleProblem> {
+    fn problem(self) -> Option<Error> {
         let found = self.learner.gradient_booster.name;
-        (found == "gblinear").then_some(EnsembleProblem::Booster { found })
+        (found == "gblinear").then(|| without_trees(&found))
     }
+}
+
+/// A booster that has no trees.
+fn without_trees(booster: &str) -> Error {
+    problem!("its booster is {booster}, which has no trees").fix("Train with booster=gbtree or dart.")
 }
 
 /// The text with `null` for the numbers that XGBoost writes and JSON does not have: NaN and the infinities.
@@ -120,14 +124,14 @@ impl Ensemble {
     /// Ensemble of a model that XGBoost itself has just trained on the features of `schema` of `objects`.
     ///
     /// # Errors
-    /// [`EnsembleProblem`] for what [`load`](Self::load) refuses.
+    /// Errors of [`load`](Self::load).
     pub fn from_xgboost(json: &[u8], schema: Schema, objects: Vec<String>) -> Result<Self> {
         let path = Path::new("XGBoost's model");
         let mut document: Document =
             serde_json::from_slice(&without_literals(json)).map_err(|error| not_json(path, &error))?;
         document.learner.attributes = write::attributes(&schema.into(), &objects, &super::Provenance::default());
         let options = Options { schemas: &[schema], ..Options::default() };
-        document.into_ensemble(&options, "JSON").map_err(|problem| Error::variant_at(Place::file(path), problem))
+        document.into_ensemble(&options, "JSON").map_err(|error| error.in_file(path))
     }
 
     /// Writes the ensemble in XGBoost's JSON model schema, whole or not at all. What is written can be
@@ -138,11 +142,11 @@ impl Ensemble {
     /// `binary:logistic`, or `binary:logitraw` where no probability in f32 stands for the base margin.
     ///
     /// # Errors
-    /// [`Kind::Io`](crate::error::Kind::Io) naming `path`; [`EnsembleProblem`] for an ensemble that [`check`](Self::check) refuses, which none
-    /// that was trained or loaded is.
+    /// [`Kind::Io`](crate::error::Kind::Io) naming `path`; errors of [`check`](Self::check), which accepts
+    /// every ensemble that was trained or loaded.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<()> {
         let path = path.as_ref();
-        self.check().map_err(|problem| Error::variant_at(Place::file(path), problem))?;
+        self.check().map_err(|error| error.in_file(path))?;
         let document = Document::new(self);
         output::write_whole(path, |out| {
             serde_json::to_writer(&mut *out, &document)?;
@@ -157,5 +161,7 @@ pub(super) fn not_json(path: &Path, error: &serde_json::Error) -> Error {
         Ok(line) if line > 0 => Place::line(path, line),
         _ => Place::file(path),
     };
-    Error::variant_at(place, EnsembleProblem::NotJson { detail: error.to_string() })
+    problem!("not an ensemble in XGBoost's JSON format: {error}")
+        .fix("Give a file that `palpate train` or XGBoost's `save_model(\"….json\")` wrote.")
+        .at(place)
 }

@@ -1,6 +1,7 @@
 //! Meaning of margins under XGBoost's objectives.
 
-use crate::error::EnsembleProblem;
+use crate::ensemble::import::options::unknown_objective;
+use crate::error::Result;
 use palpate_shared::format::Link as Inverse;
 
 /// An objective.
@@ -33,7 +34,7 @@ pub(super) enum Link {
 
 impl Objective {
     /// The objective with XGBoost's name.
-    pub(super) fn named(name: &str) -> Result<Self, EnsembleProblem> {
+    pub(super) fn named(name: &str) -> Result<Self> {
         let (kind, link) = match name {
             "multi:softprob" | "multi:softmax" => (Kind::Classes, Link::Identity),
             "binary:logistic" => (Kind::Binary, Link::Logit),
@@ -50,7 +51,7 @@ impl Objective {
             | "rank:pairwise"
             | "rank:ndcg"
             | "rank:map" => (Kind::One, Link::Identity),
-            _ => return Err(EnsembleProblem::Objective { found: name.into(), of: None }),
+            _ => return Err(unknown_objective(name, None)),
         };
         let inverse = match (kind, link) {
             (Kind::One, Link::Logit) => Inverse::Logistic,

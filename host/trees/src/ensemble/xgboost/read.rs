@@ -3,12 +3,14 @@
 use super::objective::{Kind, Objective};
 use super::schema::{Document, Forest, GradientBooster, Learner, TreeColumns};
 use super::trees::{Shape, has_sets, tree};
-use crate::ensemble::check::check_names;
+use super::without_trees;
+use crate::ensemble::check::{check_names, no_trees};
+use crate::ensemble::faults::{self, DAMAGED};
 use crate::ensemble::import::options::{
-    CATEGORIES, MISSING_UNKNOWN, Options, STOPPED_EARLY, default_names, named, one_class,
+    CATEGORIES, MISSING_UNKNOWN, Options, STOPPED_EARLY, default_names, named, one_class, unknown_objective,
 };
 use crate::ensemble::{Ensemble, Imported, Inputs, Node, Probability, Provenance, Schema, Tree, columns};
-use crate::error::EnsembleProblem;
+use crate::error::{Error, Result, problem};
 use palpate_shared::format::{Link as Inverse, Prediction};
 use std::collections::BTreeMap;
 
@@ -17,7 +19,7 @@ type Attributes = BTreeMap<String, String>;
 impl Document {
     /// The ensemble in the document: over the features of a schema if it names one, else over rows. `names` are the objects'
     /// names; `kind` is JSON or UBJSON.
-    pub(super) fn into_ensemble(self, options: &Options<'_>, kind: &str) -> Result<Ensemble, EnsembleProblem> {
+    pub(super) fn into_ensemble(self, options: &Options<'_>, kind: &str) -> Result<Ensemble> {
         let names = options.names;
         let [major, minor, _] = self.version;
         let unknown_as_missing = (major, minor) < (1, 7);
@@ -32,12 +34,10 @@ impl Document {
             Kind::Classes => classes,
             Kind::One => targets.max(1),
             Kind::Binary if targets > 1 => {
-                return Err(EnsembleProblem::Unsupported {
-                    what: format!(
-                        "it has {targets} labels, each of which is there or not, and not one of several classes"
-                    ),
-                    way: "Train a model for each label.".into(),
-                });
+                return Err(problem!(
+                    "it has {targets} labels, each of which is there or not, and not one of several classes"
+                )
+                .fix("Train a model for each label."));
             }
             Kind::Binary => 1,
         };
@@ -48,25 +48,28 @@ impl Document {
             Some(name) => {
                 let schema = schema(name, options.schemas)?;
                 if outputs != Kind::Classes {
-                    return Err(EnsembleProblem::Objective { found: objective.name, of: Some(schema.of) });
+                    return Err(unknown_objective(&objective.name, Some(schema.of)));
                 }
                 if features != schema.features.len() {
                     let Schema { name, features: own, .. } = schema;
-                    return Err(EnsembleProblem::Features { found: features, name, features: own });
+                    let (wanted, own) = (own.len(), own.join(", "));
+                    return Err(problem!("it has {features} features, but its descriptor {name} has {wanted} ({own})")
+                        .fix("Train it on that descriptor's features, or name the right descriptor."));
                 }
-                let own = object_names(&attributes)?.ok_or(EnsembleProblem::NoAttribute {
-                    name: "palpate_objects",
-                    example: "'[\"bowl\", \"fork\"]'",
+                let own = object_names(&attributes)?.ok_or_else(|| {
+                    problem!("it has no attribute palpate_objects").fix(
+                        "Before saving it in Python, set it: `booster.set_attr(palpate_objects='[\"bowl\", \"fork\"]')`.",
+                    )
                 })?;
                 if classes != own.len() {
-                    return Err(EnsembleProblem::Classes { classes, objects: own.len() });
+                    return Err(other_classes(classes, own.len()));
                 }
                 (Inputs::Computed(schema), named(names, own)?)
             }
             None => {
                 let own = object_names(&attributes)?.unwrap_or_else(|| default_names(objects, outputs == Kind::One));
                 if own.len() != objects {
-                    return Err(EnsembleProblem::Classes { classes: objects, objects: own.len() });
+                    return Err(other_classes(objects, own.len()));
                 }
                 columns::check_count(features)?;
                 let are_named = feature_names.len() == features;
@@ -77,13 +80,9 @@ impl Document {
         let mut base_margins = vec![0.0; first];
         base_margins.extend(base_scores(&learner_model_param.base_score, groups)?.into_iter().map(|b| link.margin(b)));
         if base_margins.iter().any(|margin| !margin.is_finite()) {
-            return Err(EnsembleProblem::Unsupported {
-                what: format!(
-                    "its base_score {} is no margin under {}",
-                    learner_model_param.base_score, objective.name
-                ),
-                way: "Train on labels that are not all the same.".into(),
-            });
+            let (score, objective) = (learner_model_param.base_score, objective.name);
+            return Err(problem!("its base_score {score} is no margin under {objective}")
+                .fix("Train on labels that are not all the same."));
         }
         let mut notes = Vec::new();
         let taken = taken(&forest, &attributes, groups, options.all_trees, &mut notes)?;
@@ -92,13 +91,14 @@ impl Document {
         let categories =
             named.map(Option::unwrap_or_default).enumerate().filter(|(_, names)| !names.is_empty()).collect();
         if trees.is_empty() {
-            return Err(EnsembleProblem::NoTrees);
+            return Err(no_trees());
         }
         if tree_info.len() != trees.len() {
-            return Err(EnsembleProblem::TreeInfo { found: tree_info.len(), trees: trees.len() });
+            let (found, trees) = (tree_info.len(), trees.len());
+            return Err(problem!("tree_info has {found} entries for {trees} trees").fix(DAMAGED));
         }
         if let Some(found) = weights.as_ref().map(Vec::len).filter(|&found| found != trees.len()) {
-            return Err(EnsembleProblem::WeightDrop { found, trees: trees.len() });
+            return Err(problem!("weight_drop has {found} entries for {} trees", trees.len()).fix(DAMAGED));
         }
         let shape = Shape {
             features: inputs.names().into_iter().map(String::from).collect(),
@@ -149,13 +149,7 @@ impl Document {
 }
 
 /// Number of trees that are taken: those up to the best iteration, if training stopped early and not all are asked for.
-fn taken(
-    forest: &Forest,
-    attributes: &Attributes,
-    groups: usize,
-    all: bool,
-    notes: &mut Vec<String>,
-) -> Result<usize, EnsembleProblem> {
+fn taken(forest: &Forest, attributes: &Attributes, groups: usize, all: bool, notes: &mut Vec<String>) -> Result<usize> {
     let trees = forest.trees.len();
     let Some(best) = attributes.get("best_iteration") else { return Ok(trees) };
     let best = count("best_iteration", best)?;
@@ -212,28 +206,28 @@ struct Rows {
 }
 
 /// Prediction stated by the attribute or the objective.
-fn rows(attributes: &Attributes, inverse: Inverse) -> Result<Rows, EnsembleProblem> {
+fn rows(attributes: &Attributes, inverse: Inverse) -> Result<Rows> {
     let name = "palpate_prediction";
     let expected = "a JSON object of link, last_of_ties and scale";
     let Some(text) = attributes.get(name) else {
         return Ok(Rows { prediction: Prediction { link: inverse, ..Prediction::default() }, ..Rows::default() });
     };
     let stated: StatedRows = parsed(name, expected, text)?;
-    let wrong = |detail: String| EnsembleProblem::Attribute { name, expected, detail };
+    let wrong = |detail: &str| wrong_attribute(name, expected, detail);
     let link = Inverse::ALL.iter().copied().find(|link| link.name() == stated.link);
-    let link = link.ok_or_else(|| wrong(format!("the link {:?}", stated.link)))?;
+    let link = link.ok_or_else(|| wrong(&format!("the link {:?}", stated.link)))?;
     if !(stated.scale.is_finite() && stated.scale > 0.0) {
-        return Err(wrong(format!("the scale {}", stated.scale)));
+        return Err(wrong(&format!("the scale {}", stated.scale)));
     }
     let number = |text: &String| text.parse::<f32>().ok().filter(|number| !number.is_nan());
     let sentinel = stated.sentinel.as_ref().map(|ends| ends.each_ref().map(number));
     let sentinel = match sentinel {
         None => None,
         Some([Some(low), Some(high)]) if low <= high => Some([low, high]),
-        Some(_) => return Err(wrong("the sentinel is not a range of numbers".into())),
+        Some(_) => return Err(wrong("the sentinel is not a range of numbers")),
     };
     if stated.average == 0 {
-        return Err(wrong("a mean of no trees".into()));
+        return Err(wrong("a mean of no trees"));
     }
     let StatedRows { last_of_ties, scale, average, probability, .. } = stated;
     let prediction = Prediction { link, last_of_ties, scale, targets: false, average };
@@ -242,17 +236,14 @@ fn rows(attributes: &Attributes, inverse: Inverse) -> Result<Rows, EnsembleProbl
 
 /// The trees, and the weight of each in a dart booster: up to 3.2 it wraps another booster, then weights stand beside the
 /// model, then in it.
-fn forest(booster: GradientBooster) -> Result<(Forest, Option<Vec<f32>>), EnsembleProblem> {
-    let found = booster.name;
-    if !matches!(found.as_str(), "gbtree" | "dart") {
-        return Err(EnsembleProblem::Booster { found });
+fn forest(booster: GradientBooster) -> Result<(Forest, Option<Vec<f32>>)> {
+    if !matches!(booster.name.as_str(), "gbtree" | "dart") {
+        return Err(without_trees(&booster.name));
     }
     let inner = booster.gbtree.map_or((None, None), |inner| (inner.model, inner.weight_drop));
     let Some(mut forest) = booster.model.or(inner.0) else {
-        return Err(EnsembleProblem::Unsupported {
-            what: "it has settings and no trees, as XGBoost's save_config writes them".into(),
-            way: "Save the model with `booster.save_model(\"model.json\")`.".into(),
-        });
+        return Err(problem!("it has settings and no trees, as XGBoost's save_config writes them")
+            .fix("Save the model with `booster.save_model(\"model.json\")`."));
     };
     let weights = booster.weight_drop.or(inner.1).or(forest.weight_drop.take());
     // gbtree writes no weights, or none for its trees.
@@ -284,15 +275,24 @@ fn weigh(ensemble: &mut Ensemble, weights: &[f32]) {
     }
 }
 
-fn schema(name: &str, schemas: &[Schema]) -> Result<Schema, EnsembleProblem> {
-    let unknown = || EnsembleProblem::UnknownDescriptor {
-        found: name.into(),
-        known: schemas.iter().map(|schema| schema.name).collect(),
+/// Another number of classes than the attribute names objects.
+fn other_classes(classes: usize, objects: usize) -> Error {
+    problem!("it has {classes} classes, but palpate_objects names {objects} objects")
+        .fix("Name every class once, in the order of the labels.")
+}
+
+fn schema(name: &str, schemas: &[Schema]) -> Result<Schema> {
+    let unknown = || {
+        let known: Vec<&str> = schemas.iter().map(|schema| schema.name).collect();
+        problem!("its descriptor {name:?} is unknown").fix(match known[..] {
+            [] => "Read it with the crate that defines the descriptor's features.".into(),
+            _ => format!("Use one of {}.", known.join(", ")),
+        })
     };
     schemas.iter().find(|schema| schema.name == name).copied().ok_or_else(unknown)
 }
 
-fn object_names(attributes: &Attributes) -> Result<Option<Vec<String>>, EnsembleProblem> {
+fn object_names(attributes: &Attributes) -> Result<Option<Vec<String>>> {
     let name = "palpate_objects";
     let Some(text) = attributes.get(name) else { return Ok(None) };
     let names: Vec<String> = parsed(name, "a JSON array of names", text)?;
@@ -304,7 +304,7 @@ fn object_names(attributes: &Attributes) -> Result<Option<Vec<String>>, Ensemble
 }
 
 /// Facts about the training from the optional attributes.
-fn origin(attributes: &Attributes) -> Result<Provenance, EnsembleProblem> {
+fn origin(attributes: &Attributes) -> Result<Provenance> {
     let background = attributes.get("palpate_background").map(|text| {
         let expected = "true where the last object is a background, else false";
         parsed("palpate_background", expected, text)
@@ -322,23 +322,25 @@ fn origin(attributes: &Attributes) -> Result<Provenance, EnsembleProblem> {
 /// Attributes that this crate reads.
 const READ: [&str; 4] = ["palpate_background", "palpate_descriptor", "palpate_objects", "palpate_prediction"];
 
-fn parsed<'t, T: serde::Deserialize<'t>>(
-    name: &'static str,
-    expected: &'static str,
-    text: &'t str,
-) -> Result<T, EnsembleProblem> {
-    serde_json::from_str(text).map_err(|error| EnsembleProblem::Attribute { name, expected, detail: error.to_string() })
+fn parsed<'t, T: serde::Deserialize<'t>>(name: &str, expected: &str, text: &'t str) -> Result<T> {
+    serde_json::from_str(text).map_err(|error| wrong_attribute(name, expected, error))
+}
+
+/// An attribute that does not hold what is expected of it.
+fn wrong_attribute(name: &str, expected: &str, detail: impl std::fmt::Display) -> Error {
+    problem!("{name} is not {expected}: {detail}")
+        .fix("Correct the attribute, or remove it if it is not palpate_objects.")
 }
 
 /// A count; XGBoost leaves out some that older versions did not know.
-fn count(name: &'static str, text: &str) -> Result<usize, EnsembleProblem> {
+fn count(name: &str, text: &str) -> Result<usize> {
     if text.is_empty() {
         return Ok(0);
     }
-    text.parse().map_err(|_| EnsembleProblem::Count { name, text: text.into() })
+    text.parse().map_err(|_| faults::count(name, text))
 }
 
-fn base_scores(text: &str, objects: usize) -> Result<Vec<f32>, EnsembleProblem> {
+fn base_scores(text: &str, objects: usize) -> Result<Vec<f32>> {
     let list = text.strip_prefix('[').and_then(|rest| rest.strip_suffix(']'));
     let parsed: Result<Vec<f32>, _> = list.unwrap_or(text).split(',').map(|number| number.trim().parse()).collect();
     match parsed {
@@ -347,5 +349,5 @@ fn base_scores(text: &str, objects: usize) -> Result<Vec<f32>, EnsembleProblem> 
         Ok(margins) if margins.len() == objects => return Ok(margins),
         _ => {}
     }
-    Err(EnsembleProblem::BaseScore { text: text.into(), objects })
+    Err(problem!("its base_score {text:?} is neither a number nor {objects} numbers, or is not finite").fix(DAMAGED))
 }

@@ -1,13 +1,14 @@
 //! From one of XGBoost's trees to nodes, everything checked.
 
 use super::schema::TreeColumns;
+use crate::ensemble::faults::{self, DAMAGED};
 use crate::ensemble::import::draft::DraftTree;
 use crate::ensemble::import::draft_node::DraftNode;
 use crate::ensemble::import::set::Set;
 use crate::ensemble::import::spelled_out::spelled_out;
 use crate::ensemble::nodes::reachable;
-use crate::ensemble::{Node, Output, Threshold, Tree};
-use crate::error::{EnsembleProblem, TreeProblem};
+use crate::ensemble::{Node, Output, Threshold, Tree, check_leaf};
+use crate::error::{Error, Result, problem};
 use std::collections::BTreeMap;
 
 /// Facts of a document about all of its trees.
@@ -25,27 +26,23 @@ pub(super) struct Shape {
 }
 
 /// A column must have one entry for each node; XGBoost leaves some columns out, which read as empty.
-fn whole(column: &'static str, found: usize, wanted: usize) -> Result<(), TreeProblem> {
-    if found == wanted { Ok(()) } else { Err(TreeProblem::Column { column, found, wanted }) }
+fn whole(column: &str, found: usize, wanted: usize) -> Result<()> {
+    if found == wanted { Ok(()) } else { Err(faults::column(column, found, wanted)) }
 }
 
 /// XGBoost takes no categories from here on, nor negative ones: they go left, or up to 1.6 as missing ones.
 const OUT_OF_RANGE: u32 = 1 << 24;
 
 /// Reads the tree with this number.
-pub(super) fn tree(
-    columns: &TreeColumns,
-    (number, group): (usize, u64),
-    shape: &Shape,
-) -> Result<Tree, EnsembleProblem> {
-    let wrong = |problem| EnsembleProblem::Tree { tree: number, problem };
+pub(super) fn tree(columns: &TreeColumns, (number, group): (usize, u64), shape: &Shape) -> Result<Tree> {
+    let wrong = |error: Error| error.within(format_args!("tree {number}: "));
     let tree = plain(columns, group, shape).map_err(wrong)?;
     if !has_sets(columns) {
         return Ok(tree);
     }
     let sets = sets(columns, shape).map_err(wrong)?;
     let output = tree.output;
-    let read = |position: usize| -> Result<DraftNode, EnsembleProblem> {
+    let read = |position: usize| -> Result<DraftNode> {
         // What no other node leads to was not checked, and is not reached.
         Ok(match node(columns, position, output, shape) {
             Ok(Node::Split { .. }) if is_set(columns, position) && !sets.contains_key(&position) => {
@@ -86,14 +83,15 @@ fn is_set(columns: &TreeColumns, position: usize) -> bool {
 }
 
 /// The categories of each node that splits by them.
-fn sets(columns: &TreeColumns, shape: &Shape) -> Result<BTreeMap<usize, Vec<u32>>, TreeProblem> {
+fn sets(columns: &TreeColumns, shape: &Shape) -> Result<BTreeMap<usize, Vec<u32>>> {
     let splits = columns.split_type.iter().enumerate().filter(|(_, kind)| **kind != 0);
     let mut sets: BTreeMap<usize, Option<Vec<u32>>> = splits.map(|(node, _)| (node, None)).collect();
     if !shape.infinite {
         let node = sets.keys().next().copied().unwrap_or_default();
         let feature = columns.split_indices.get(node).and_then(|&index| usize::try_from(index).ok());
-        let name = feature.and_then(|feature| shape.features.get(feature));
-        return Err(TreeProblem::Categorical { feature: name.cloned().unwrap_or_default() });
+        let name = feature.and_then(|feature| shape.features.get(feature)).map_or("", String::as_str);
+        return Err(problem!("it splits on categories of the feature {name}")
+            .fix("Encode categories as numbers before training, one column of 0 and 1 for each (one-hot)."));
     }
     let wanted = columns.categories_nodes.len();
     whole("categories_segments", columns.categories_segments.len(), wanted)?;
@@ -107,7 +105,7 @@ fn sets(columns: &TreeColumns, shape: &Shape) -> Result<BTreeMap<usize, Vec<u32>
         let own = own.map(|own| own.iter().filter_map(|&category| u32::try_from(category).ok()));
         let own = own.map(|own| own.filter(|category| *category < OUT_OF_RANGE).collect());
         let (Some(place), Some(own)) = (place, own) else {
-            return Err(TreeProblem::Column { column: "categories", found: columns.categories.len(), wanted });
+            return Err(faults::column("categories", columns.categories.len(), wanted));
         };
         *place = Some(own);
     }
@@ -116,9 +114,9 @@ fn sets(columns: &TreeColumns, shape: &Shape) -> Result<BTreeMap<usize, Vec<u32>
 }
 
 /// The tree, without what sets of categories say.
-fn plain(columns: &TreeColumns, group: u64, shape: &Shape) -> Result<Tree, TreeProblem> {
+fn plain(columns: &TreeColumns, group: u64, shape: &Shape) -> Result<Tree> {
     let objects = shape.groups;
-    let number = |name, text: &str| text.parse().map_err(|_| TreeProblem::Count { name, text: text.into() });
+    let number = |name, text: &str| text.parse().map_err(|_| faults::count(name, text));
     let nodes = columns.left_children.len();
     let stated = number("num_nodes", &columns.tree_param.num_nodes)?;
     whole("left_children", nodes, stated)?;
@@ -127,14 +125,14 @@ fn plain(columns: &TreeColumns, group: u64, shape: &Shape) -> Result<Tree, TreeP
     whole("split_conditions", columns.split_conditions.len(), nodes)?;
     whole("default_left", columns.default_left.len(), nodes)?;
     if nodes == 0 {
-        return Err(TreeProblem::NoNodes);
+        return Err(faults::no_nodes());
     }
     let values = number("size_leaf_vector", &columns.tree_param.size_leaf_vector)?.max(1);
     let output = match usize::try_from(group) {
         _ if values == objects && objects > 1 => Output::Each,
         Ok(object) if values == 1 && object < objects => Output::One(object + shape.first),
-        _ if values == 1 => return Err(TreeProblem::Object { object: group, objects }),
-        _ => return Err(TreeProblem::LeafWidth { values, objects }),
+        _ if values == 1 => return Err(faults::object(group, objects)),
+        _ => return Err(problem!("its leaves hold {values} values for {objects} objects").fix(DAMAGED)),
     };
     let read = |position: usize| node(columns, position, output, shape);
     let nodes = reachable(nodes, read)?;
@@ -142,28 +140,25 @@ fn plain(columns: &TreeColumns, group: u64, shape: &Shape) -> Result<Tree, TreeP
 }
 
 /// Node `position` as the file has it, its values and its feature checked, its children checked for range only.
-fn node(columns: &TreeColumns, position: usize, output: Output, shape: &Shape) -> Result<Node, TreeProblem> {
+fn node(columns: &TreeColumns, position: usize, output: Output, shape: &Shape) -> Result<Node> {
     let (features, objects) = (shape.features.len(), shape.groups);
     let left = columns.left_children[position];
     if left == -1 {
         return leaf(columns, position, output, objects).map(Node::Leaf);
     }
     let nodes = columns.left_children.len();
-    let child = |side: &'static str, child: i64| {
+    let child = |side: &str, child: i64| {
         let in_range = usize::try_from(child).ok().filter(|&child| child < nodes);
-        in_range.ok_or(TreeProblem::Child { node: position, side, child, nodes })
+        in_range.ok_or_else(|| faults::child(position, side, child, nodes))
     };
     let feature = columns.split_indices[position];
     let threshold = if is_set(columns, position) { 0.0 } else { columns.split_conditions[position] };
     if threshold.is_nan() || !(shape.infinite || threshold.is_finite()) {
-        return Err(TreeProblem::Threshold { node: position, threshold });
+        return Err(faults::threshold(position, threshold));
     }
+    let index = usize::try_from(feature).ok().filter(|&index| index < features);
     Ok(Node::Split {
-        feature: usize::try_from(feature).ok().filter(|&index| index < features).ok_or(TreeProblem::Feature {
-            node: position,
-            feature,
-            features,
-        })?,
+        feature: index.ok_or_else(|| faults::feature(position, feature, features))?,
         threshold,
         missing_left: columns.default_left[position].is_set(),
         left: child("left", left)?,
@@ -171,24 +166,22 @@ fn node(columns: &TreeColumns, position: usize, output: Output, shape: &Shape) -
     })
 }
 
-fn leaf(columns: &TreeColumns, position: usize, output: Output, objects: usize) -> Result<Vec<f32>, TreeProblem> {
-    let no_values = |column| TreeProblem::NoValues { node: position, column, values: objects };
+fn leaf(columns: &TreeColumns, position: usize, output: Output, objects: usize) -> Result<Vec<f32>> {
+    let no_values = |column| problem!("node {position}: {column} has no {objects} values for this leaf").fix(DAMAGED);
     let values = match (output, &columns.leaf_weights) {
         (Output::One(_), _) => vec![columns.split_conditions[position]],
         (Output::Each, None) => {
             let start = position * objects;
             let values = columns.base_weights.get(start..start + objects);
-            values.ok_or(no_values("base_weights"))?.to_vec()
+            values.ok_or_else(|| no_values("base_weights"))?.to_vec()
         }
         (Output::Each, Some(weights)) => {
             let number = columns.right_children[position];
             let start = usize::try_from(number).ok().and_then(|number| number.checked_mul(objects));
             let values = start.and_then(|start| weights.get(start..start.checked_add(objects)?));
-            values.ok_or(no_values("leaf_weights"))?.to_vec()
+            values.ok_or_else(|| no_values("leaf_weights"))?.to_vec()
         }
     };
-    match values.iter().find(|value| !value.is_finite()) {
-        Some(&value) => Err(TreeProblem::LeafValue { node: position, value }),
-        None => Ok(values),
-    }
+    check_leaf(position, &values, values.len())?;
+    Ok(values)
 }

@@ -1,9 +1,10 @@
 //! `TreeEnsembleClassifier` and `TreeEnsembleRegressor`: lists of nodes that name their tree and themselves.
 
 use super::wire::Node;
-use super::{Draft, Result, Targeted, add_tree, comparison, damaged, divisor, index, list, outputs};
+use super::{Draft, Targeted, add_tree, comparison, damaged, divisor, index, list, outputs};
 use crate::ensemble::Probability;
 use crate::ensemble::import::options::one_class;
+use crate::error::Result;
 use palpate_shared::format::Link;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 

@@ -1,8 +1,9 @@
 //! `TreeEnsemble` of `ai.onnx.ml` 5: splits and leaves in lists of their own, by position.
 
 use super::wire::Node;
-use super::{Draft, Result, Targeted, add_tree, comparison, damaged, divisor, index, list, outputs};
+use super::{Draft, Targeted, add_tree, comparison, damaged, divisor, index, list, outputs};
 use crate::ensemble::Probability;
+use crate::error::Result;
 use palpate_shared::format::Link;
 
 /// The modes' names, by their codes.

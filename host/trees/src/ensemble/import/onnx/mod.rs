@@ -10,12 +10,10 @@ mod wire;
 
 use super::draft::{Draft, DraftTree, Targeted};
 use super::draft_node::DraftNode;
-use super::unsupported;
-use crate::ensemble::{Ensemble, MAX_OBJECTS, Threshold, columns::check_count};
-use crate::error::EnsembleProblem;
+use crate::ensemble::{Ensemble, MAX_OBJECTS, Threshold, check::object_count, columns::check_count};
+use crate::error::{Error, Result, problem};
+use std::fmt::Display;
 use wire::{Attribute, Graph, Node};
-
-type Result<T, E = EnsembleProblem> = std::result::Result<T, E>;
 
 /// Operations around an ensemble that change no margin.
 const HARMLESS: [&str; 5] = ["Identity", "Cast", "Reshape", "ZipMap", "Flatten"];
@@ -25,8 +23,8 @@ pub(super) fn is_onnx(bytes: &[u8]) -> bool {
     matches!(bytes, [0x08, 1..=40, 0x12 | 0x1a | 0x22 | 0x28 | 0x32 | 0x3a | 0x42, ..])
 }
 
-fn damaged(what: impl Into<String>) -> EnsembleProblem {
-    EnsembleProblem::Damaged { kind: "ONNX", what: what.into() }
+fn damaged(what: impl Display) -> Error {
+    super::damaged("ONNX", what)
 }
 
 /// Reads an ONNX file.
@@ -35,25 +33,23 @@ pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
     let is_ensemble = |node: &&Node<'_>| node.operation.starts_with("TreeEnsemble");
     let mut ensembles = model.graph.nodes.iter().filter(is_ensemble);
     let Some(node) = ensembles.next() else {
-        return Err(unsupported("it is an ONNX file without a tree ensemble", "Give an ONNX file of trees."));
+        return Err(problem!("it is an ONNX file without a tree ensemble").fix("Give an ONNX file of trees."));
     };
     let others = ensembles.count();
     if others > 0 {
-        return Err(unsupported(
-            format!(
-                "it has {} tree ensembles, whose outputs are combined by other operators: weights, votes, probabilities",
-                others + 1
-            ),
+        return Err(problem!(
+            "it has {} tree ensembles, whose outputs are combined by other operators: weights, votes, probabilities",
+            others + 1
+        )
+        .fix(
             "In place of AdaBoost, Bagging, Voting, Stacking, OneVsRest or a calibrated classifier, train and give a \
              forest or boosted trees. A single model that onnxmltools split has to be converted without `split`.",
         ));
     }
     let harmless = |node: &&Node<'_>| !is_ensemble(node) && !HARMLESS.contains(&node.operation);
     if let Some(node) = model.graph.nodes.iter().find(harmless) {
-        return Err(unsupported(
-            format!("beside the trees it computes with {}", node.operation),
-            "Convert the trees alone, and compute the steps before and after them yourself.",
-        ));
+        return Err(problem!("beside the trees it computes with {}", node.operation)
+            .fix("Convert the trees alone, and compute the steps before and after them yourself."));
     }
     let columns = columns(&model.graph, node)?;
     // CatBoost states its sources and its compiler there as well.
@@ -65,7 +61,7 @@ pub(super) fn read(bytes: &[u8], names: Option<&[String]>) -> Result<Ensemble> {
         "TreeEnsemble" => five::read(node, &mut draft)?,
         "TreeEnsembleClassifier" | "TreeEnsembleRegressor" => classic::read(node, &mut draft)?,
         other => {
-            return Err(unsupported(format!("its operator {other} is unknown"), "Convert it with opset 5 or older."));
+            return Err(problem!("its operator {other} is unknown").fix("Convert it with opset 5 or older."));
         }
     };
     let count = columns.unwrap_or(features);
@@ -124,10 +120,8 @@ fn comparison(mode: &str, value: f64, missing_is_true: bool) -> Result<Compariso
         "GTE" => (Threshold::below(value), true),
         "GT" => (Threshold::at_or_below(value), true),
         _ => {
-            return Err(unsupported(
-                format!("it splits on categories (BRANCH_{mode})"),
-                "Encode categories as numbers before training, one column of 0 and 1 for each (one-hot).",
-            ));
+            return Err(problem!("it splits on categories (BRANCH_{mode})")
+                .fix("Encode categories as numbers before training, one column of 0 and 1 for each (one-hot)."));
         }
     };
     // A comparison with NaN is false, unless it is stated to be true.
@@ -157,7 +151,7 @@ fn index(number: i64, what: &str) -> Result<usize> {
 /// Number of outputs stated by a file.
 fn outputs(count: i64) -> Result<usize> {
     let count = index(count, "n_targets")?;
-    if (1..=MAX_OBJECTS).contains(&count) { Ok(count) } else { Err(EnsembleProblem::ObjectCount { count }) }
+    if (1..=MAX_OBJECTS).contains(&count) { Ok(count) } else { Err(object_count(count)) }
 }
 
 /// Divisor of the leaves' values.
@@ -165,10 +159,8 @@ fn divisor(aggregate: &str, trees: usize) -> Result<f64> {
     match aggregate {
         "SUM" => Ok(1.0),
         "AVERAGE" => Ok(trees.max(1) as f64),
-        _ => Err(unsupported(
-            format!("it takes the {aggregate} of its trees, not their sum"),
-            "Give an ensemble whose trees are added or averaged.",
-        )),
+        _ => Err(problem!("it takes the {aggregate} of its trees, not their sum")
+            .fix("Give an ensemble whose trees are added or averaged.")),
     }
 }
 
