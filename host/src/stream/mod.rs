@@ -40,7 +40,8 @@ pub use settings::Settings;
 #[cfg(feature = "train")]
 pub use settings::StrangerTest;
 
-use crate::error::{EvaluateProblem, Result, RowsProblem};
+use crate::error::{Result, RowsProblem};
+use crate::evaluate::over_touches;
 use crate::evaluate::together::units_of_rows;
 use palpate_onboard::{Model, Refused, RowsSeen};
 use palpate_shared::format::Position;
@@ -128,10 +129,10 @@ impl<'r> Rows<'r> {
 /// Refuses a model that has no classes of rows.
 ///
 /// # Errors
-/// [`EvaluateProblem::OverTouches`] and [`RowsProblem::Regression`].
+/// When the model is over touches; [`RowsProblem::Regression`].
 pub fn check(model: &Model<'_>) -> Result<()> {
     if model.descriptor().is_some() {
-        return Err(EvaluateProblem::OverTouches.into());
+        return Err(over_touches());
     }
     if model.known_count() < 2 {
         return Err(RowsProblem::Regression { output: model.object_name(0).into() }.into());
