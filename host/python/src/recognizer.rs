@@ -7,6 +7,7 @@ use crate::model::{Model, other_fields, touch};
 use crate::objects::{self, class};
 use numpy::ndarray::Ix1;
 use palpate::compile;
+use palpate::error::Error;
 use palpate::evaluate::too_many_objects;
 use palpate::onboard::{Refused, RowsSeen, Stopping, Verdict};
 use palpate::rows::{Encoder, Features};

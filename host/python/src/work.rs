@@ -1,7 +1,6 @@
 //! Long calls: without the interpreter's lock, stopped by Ctrl-C, with a callback for how far they have come.
 
 use crate::failure::Failure;
-use palpate::error::Error;
 use palpate::progress::Progress;
 use pyo3::Borrowed;
 use pyo3::inspect::PyStaticExpr;
