@@ -2,12 +2,13 @@
 
 use palpate::capture::touches;
 use palpate::compile::CompiledModel;
-use palpate::error::{EvaluateProblem, Result};
+use palpate::error::Result;
+use palpate::evaluate::too_many_objects;
 use palpate::probe::hand::within;
 use palpate::probe::noise::Noise;
 use palpate::probe::scene::Scene;
 use palpate::touches::Origin;
-use palpate_onboard::{CapacityError, Recognizer, Stopping, Verdict};
+use palpate_onboard::{Recognizer, Stopping, Verdict};
 use palpate_report::play::Surface;
 use palpate_shared::Touch;
 use std::fmt::Write;
@@ -21,7 +22,7 @@ const ROUND: u64 = 100;
 /// evaluation's noise and a recognizer do, not as the page's game does.
 ///
 /// # Errors
-/// Errors of [`Scene::new`] and [`touches`]; [`EvaluateProblem::TooManyObjects`].
+/// Errors of [`Scene::new`] and [`touches`]; when there are more than 256 objects.
 pub fn trace(surfaces: &[Surface], models: &[CompiledModel], noise: &Noise, rounds: u64) -> Result<String> {
     let mut text = String::new();
     for (number, surface) in surfaces.iter().enumerate() {
@@ -36,11 +37,8 @@ pub fn trace(surfaces: &[Surface], models: &[CompiledModel], noise: &Noise, roun
             let sensed: Vec<Touch> = (0..).zip(captured.touches()).filter_map(noisy).collect();
             let opened: Vec<_> = models.iter().map(CompiledModel::model).collect();
             let recognizer = |model| Recognizer::<256>::new(model, Stopping::from_model(model));
-            let too_many = |error: CapacityError| EvaluateProblem::TooManyObjects {
-                objects: error.objects,
-                capacity: error.capacity,
-            };
-            let mut recognizers: Vec<_> = opened.iter().map(recognizer).collect::<Result<_, _>>().map_err(too_many)?;
+            let recognizers: Result<Vec<_>, _> = opened.iter().map(recognizer).collect();
+            let mut recognizers = recognizers.map_err(too_many_objects)?;
             for (index, touch) in sensed.iter().enumerate() {
                 let times = touch.times().map(|time| time.micros().map_or("-".into(), |micros| micros.to_string()));
                 // Writing to a string cannot fail.

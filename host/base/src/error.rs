@@ -84,10 +84,26 @@ pub enum Kind {
     Cancelled,
     /// Standard output was closed by its reader (`palpate … | head`): not an error for the user.
     Closed,
+    /// A place that is written to holds something else.
+    Exists,
     /// Margins of a library do not belong to the rows or the outputs of the model that is compared with them.
     Margins,
     /// Predictions of a library do not belong to the rows or the outputs of the model that is compared with them.
     Predictions,
+    /// There is too little data for what was asked.
+    TooFew,
+    /// Too many sequences of known objects end as unknown at every threshold that was tried.
+    TooManyAlarms {
+        /// Number of sequences of each object.
+        sequences: u64,
+    },
+    /// Objects cannot be touched with all fingers.
+    Untouchable {
+        /// Their names.
+        objects: Vec<String>,
+        /// True if they have their true size.
+        is_true_size: bool,
+    },
 }
 
 /// A problem as a value: where it is, what is wrong, what to do. It is made where it arises:

@@ -40,6 +40,12 @@ pub fn counted(number: usize, one: &str, several: &str) -> String {
     format!("{} {}", count(number), if number == 1 { one } else { several })
 }
 
+/// Names with commas between them: the first ten, and the number of the others.
+pub fn first_ten(names: &[String]) -> String {
+    let first = names[..names.len().min(10)].join(", ");
+    if names.len() > 10 { format!("{first} and {} more", names.len() - 10) } else { first }
+}
+
 /// A share of one in percent, with this many decimals: "12.3 %".
 pub fn percent(share: f64, decimals: usize) -> String {
     match decimal(100.0 * share, decimals) {

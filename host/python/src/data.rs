@@ -8,7 +8,7 @@ use crate::work::long;
 use numpy::ndarray::{Ix1, Ix2};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use palpate::ensemble::feature_row;
-use palpate::error::Error;
+use palpate::error::{Error, problem};
 use palpate::shared::format::Length;
 use palpate::shared::{Q15_ONE, Touch};
 use palpate::touches::{
@@ -171,14 +171,11 @@ impl DataSet {
                 Some(position) => touch.and_then(|touch| located(touch, position[row])),
                 None => touch,
             };
-            let touch = touch.map_err(|problem| palpate::error::TouchesProblem::Row {
-                row: row as u64 + 1,
-                problem: Box::new(problem),
-            });
+            let touch = touch.map_err(|error| error.within(format_args!("row {}: ", row + 1)));
             let index = usize::try_from(*object).ok().filter(|object| *object < names.len());
             let index =
                 index.ok_or_else(|| Error::setting("objects", object, format!("0 to {}", names.len().max(1) - 1)))?;
-            touches[index].push((touch.map_err(Error::from)?, instances.map_or(0, |instances| instances[row])));
+            touches[index].push((touch?, instances.map_or(0, |instances| instances[row])));
             if let Some(robots) = robots {
                 let robot = u32::try_from(robots[row]);
                 robots_of[index]
@@ -191,7 +188,7 @@ impl DataSet {
         });
         let objects: Vec<ObjectTouches> = objects.collect();
         if objects.is_empty() || objects.iter().any(|object| object.is_empty()) {
-            return Err(Error::from(palpate::error::EvaluateProblem::NoTouches).into());
+            return Err(problem!("an object has no touches").fix("Give at least one touch of each object.").into());
         }
         let origin = probe.map(|Probe(probe)| Origin {
             probe,
@@ -204,7 +201,7 @@ impl DataSet {
             ..Origin::default()
         });
         let longest = origin.as_ref().map_or_else(Longest::default, Origin::longest);
-        longest.check_objects(&objects).map_err(Error::from)?;
+        longest.check_objects(&objects)?;
         Ok(Self::new(Dataset { origin, ..Dataset::new(objects) }, None))
     }
 

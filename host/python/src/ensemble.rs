@@ -9,7 +9,8 @@ use numpy::ndarray::{Ix1, Ix2};
 use palpate::ensemble::import::{Options, PartTree, Parts};
 use palpate::ensemble::train::{self as library, Outputs, Settings};
 use palpate::ensemble::{self, Inputs, Node, OverTouches, Probability, StatedProbe, Threshold};
-use palpate::error::{Error, EvaluateProblem};
+use palpate::error::Error;
+use palpate::evaluate::raw_features;
 use palpate::rows::{Features, notes};
 use palpate::shared::Descriptor;
 use palpate::shared::format::{Counted, Link, Prediction};
@@ -248,7 +249,7 @@ impl Ensemble {
     /// The margins of each touch of a data set.
     fn margins_of<'py>(&self, py: Python<'py>, data: Bound<'py, DataSet>) -> Result<Output<'py, f32, Ix2>, Failure> {
         if self.ensemble.descriptor().is_none() {
-            return Err(Error::from(EvaluateProblem::RawFeatures).into());
+            return Err(raw_features().into());
         }
         let data = data.get();
         let margins = py.detach(|| {

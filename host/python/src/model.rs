@@ -9,10 +9,11 @@ use crate::objects;
 use numpy::ndarray::Ix2;
 use palpate::compile::{self as library, Compiled, CompiledModel, Language, Leaf, Settings};
 use palpate::ensemble::Probability;
-use palpate::error::{Error, EvaluateProblem, TouchesProblem};
+use palpate::error::{Error, problem};
 use palpate::evaluate::Candidate;
 use palpate::evaluate::predict::{Predicted, predict};
 use palpate::evaluate::together::{AT_ONCE, Together, TouchesTogether};
+use palpate::evaluate::{over_touches, raw_features};
 use palpate::onboard;
 use palpate::output;
 use palpate::rows::{Encoder, Features, feature_names, notes};
@@ -146,7 +147,7 @@ impl Model {
             other => other,
         };
         Ok(match (rows, own.model().descriptor()) {
-            (Rows::Data(_), None) => return Err(Error::from(EvaluateProblem::RawFeatures).into()),
+            (Rows::Data(_), None) => return Err(raw_features().into()),
             (Rows::Data(data), Some(_)) => {
                 let touches: Vec<Touch> = data.get().touches().copied().collect();
                 own.of_touches(py, &touches)?
@@ -331,13 +332,13 @@ impl Model {
         let own = slf.get();
         let (prediction, objects) = (own.model().prediction(), own.model().object_count());
         if own.model().descriptor().is_some() {
-            return Err(Error::from(EvaluateProblem::OverTouches).into());
+            return Err(over_touches().into());
         }
         let rule = own.source.as_ref().map(|(_, _, compiled)| compiled.probability);
         let is_class = objects > 1 && !prediction.targets;
         let rule = rule.filter(|rule| is_class && *rule != Probability::Unknown);
-        let none = EvaluateProblem::NoProbabilities { is_loaded: own.source.is_none() && is_class };
-        let rule = rule.ok_or_else(|| Error::from(none))?;
+        let is_loaded = own.source.is_none() && is_class;
+        let rule = rule.ok_or_else(|| no_probabilities(is_loaded))?;
         let margins = Self::of_all(slf, rows)?;
         let shares = margins.chunks_exact(objects).filter_map(|row| rule.of(row));
         Ok(two(slf.py(), shares.flatten().collect(), objects)?)
@@ -349,10 +350,10 @@ impl Model {
     /// the objects' names. Rows are as for `margins`.
     #[pyo3(signature = (rows, *, raw=false))]
     fn predict<'py>(slf: &Bound<'py, Self>, rows: Rows<'py>, raw: bool) -> Result<objects::Predictions<'py>, Failure> {
-        let Rows::Array(array) = rows else { return Err(Error::from(EvaluateProblem::OverTouches).into()) };
+        let Rows::Array(array) = rows else { return Err(over_touches().into()) };
         let (py, own) = (slf.py(), slf.get());
         if own.model().descriptor().is_some() {
-            return Err(Error::from(EvaluateProblem::OverTouches).into());
+            return Err(over_touches().into());
         }
         let array = features(slf, array)?;
         let predicted = match &own.encoder {
@@ -390,17 +391,16 @@ impl Model {
 /// Touches from rows of three or nine numbers.
 fn touches(values: &[f64], columns: usize) -> palpate::Result<Vec<Touch>> {
     if columns != 3 && columns != 9 {
-        return Err(TouchesProblem::Fields { count: columns }.into());
+        return Err(other_fields(columns));
     }
     let of = |(row, numbers): (usize, &[f64])| {
-        let problem = |problem| TouchesProblem::Row { row: row as u64 + 1, problem: Box::new(problem) }.into();
-        touch(numbers).map_err(problem)
+        touch(numbers).map_err(|error| error.within(format_args!("row {}: ", row + 1)))
     };
     values.chunks_exact(columns).enumerate().map(of).collect()
 }
 
 /// A touch from three or nine numbers, NaN where one is missing.
-pub(crate) fn touch(numbers: &[f64]) -> Result<Touch, TouchesProblem> {
+pub(crate) fn touch(numbers: &[f64]) -> palpate::Result<Touch> {
     let time = |time: f64| Some(time).filter(|time| !time.is_nan());
     let vector = |vector: [f64; 3]| Some(vector).filter(|vector| !vector.iter().all(|cosine| cosine.is_nan()));
     match *numbers {
@@ -408,7 +408,25 @@ pub(crate) fn touch(numbers: &[f64]) -> Result<Touch, TouchesProblem> {
         [a, b, c, dx, dy, dz, ax, ay, az] => {
             touch_of_seconds([a, b, c].map(time), vector([dx, dy, dz]), vector([ax, ay, az]))
         }
-        _ => Err(TouchesProblem::Fields { count: numbers.len() }),
+        _ => Err(other_fields(numbers.len())),
+    }
+}
+
+/// The problem of as many numbers, which are no touch.
+pub(crate) fn other_fields(count: usize) -> Error {
+    problem!("{count} numbers where a touch has three times, or three times and six direction cosines")
+        .fix("Give three times in seconds, NaN for a missing contact, and optionally direction and alignment.")
+}
+
+/// The problem of a model whose margins do not say which probabilities the library predicts.
+fn no_probabilities(is_loaded: bool) -> Error {
+    match is_loaded {
+        true => problem!("the bytes of a loaded model do not say how its library makes probabilities of margins")
+            .fix("Compile its estimator again."),
+        false => problem!(
+            "the model's margins do not determine probabilities: it predicts values, or classes of a calibrator or a hinge loss"
+        )
+        .fix("Use `predict` or `margins`."),
     }
 }
 

@@ -3,11 +3,12 @@
 use crate::arrays::{ArrayLike, Input, columns, taken};
 use crate::cells::OpenedRecognizer;
 use crate::failure::Failure;
-use crate::model::{Model, touch};
+use crate::model::{Model, other_fields, touch};
 use crate::objects::{self, class};
 use numpy::ndarray::Ix1;
 use palpate::compile;
-use palpate::error::{Error, EvaluateProblem, TouchesProblem};
+use palpate::error::Error;
+use palpate::evaluate::too_many_objects;
 use palpate::onboard::{Refused, RowsSeen, Stopping, Verdict};
 use palpate::rows::{Encoder, Features};
 use palpate::shared::Touch;
@@ -55,9 +56,9 @@ impl<'a, 'py> FromPyObject<'a, 'py> for TouchInput {
         let (numbers, count) = numbers::<9>(object)?;
         let touch = match numbers.get(..count) {
             Some(numbers) => touch(numbers),
-            None => Err(TouchesProblem::Fields { count }),
+            None => Err(other_fields(count)),
         };
-        touch.map(Self).map_err(|problem| Failure::from(Error::from(problem)).into())
+        touch.map(Self).map_err(|error| Failure::from(error).into())
     }
 }
 
@@ -102,10 +103,7 @@ impl Recognizer {
         // The model's own threshold stays as it is, to the last bit.
         let stopping = if error_rate.is_none() { own.with_max_touches(limit) } else { stopping };
         let cell = OpenedRecognizer::try_new(Arc::clone(&model.opened), |opened| {
-            palpate::onboard::Recognizer::new(opened.borrow_dependent(), stopping).map_err(|error| {
-                let (objects, capacity) = (error.objects, error.capacity);
-                Error::from(EvaluateProblem::TooManyObjects { objects, capacity })
-            })
+            palpate::onboard::Recognizer::new(opened.borrow_dependent(), stopping).map_err(too_many_objects)
         })?;
         let names = compile::names(model.model()).iter().map(|name| PyString::new(py, name).unbind()).collect();
         let longest = model.model().descriptor().map(|_| compile::longest(model.model()));
@@ -119,7 +117,7 @@ impl Recognizer {
     fn push<'py>(&mut self, py: Python<'py>, touch: TouchInput) -> Result<objects::Verdict<'py>, Failure> {
         let TouchInput(touch) = touch;
         if let Some(longest) = &self.longest {
-            longest.check(&touch).map_err(Error::from)?;
+            longest.check(&touch)?;
         }
         // A little later than the stroke is missing, as on the chip.
         let touch = palpate::evaluate::delivered(self.cell.borrow_dependent().model(), &touch);

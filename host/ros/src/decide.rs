@@ -70,7 +70,7 @@ impl Decider {
     pub(crate) fn touch(&mut self, message: &Touch) -> Step {
         let felt = match message.felt() {
             Ok(felt) => felt,
-            Err(problem) => return self.refused(problem.to_string()),
+            Err(error) => return self.refused(error.what().to_owned()),
         };
         if message.object != self.object || self.following.verdict() != Decision::Undecided {
             self.object.clone_from(&message.object);

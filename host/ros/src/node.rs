@@ -308,7 +308,7 @@ impl Running<'_> {
                     self.order(Order::Touch(touch));
                     return;
                 }
-                Err(problem) => refused(problem.to_string()),
+                Err(error) => refused(error.what().to_owned()),
             },
         };
         self.took(step).await;

@@ -1,6 +1,6 @@
 //! Messages as they travel, field by field as in `host/msg`, `host/srv` and `host/action`.
 
-use palpate::error::TouchesProblem;
+use palpate::error::Result;
 use palpate::onboard::shared::{Pose as FeltPose, Q15_ONE, Touch as Felt};
 use palpate::touches::{located, touch_of_seconds};
 use ros2_client::Message;
@@ -29,7 +29,7 @@ impl Touch {
     ///
     /// # Errors
     /// The number at fault, and the reason.
-    pub(crate) fn felt(&self) -> Result<Felt, TouchesProblem> {
+    pub(crate) fn felt(&self) -> Result<Felt> {
         let pose = |vector| self.has_pose.then_some(vector);
         let times = self.times.map(|time| if time.is_nan() { None } else { Some(time) });
         let touch = touch_of_seconds(times, pose(self.direction), pose(self.alignment))?;

@@ -2,7 +2,8 @@
 
 use super::ahead::{Ahead, Feed};
 use super::demand::Demand;
-use crate::error::{Error, EvaluateProblem, Result};
+use crate::error::{Error, Result};
+use crate::evaluate::no_pose_of;
 use crate::evidence::Sequence;
 use crate::evidence::{self, Follower, Limit, Sequences, Supplier, chip};
 use crate::in_order::in_order;
@@ -149,15 +150,14 @@ impl<F: Follower<Step = [i32]> + ?Sized> Sequences<F> for MarginSupply<'_, '_, '
 /// one that is used up ends its supply, as the end of all touches does without a plan.
 ///
 /// # Errors
-/// [`EvaluateProblem::NoPoseOf`] for a touch without a pose.
+/// When a touch has no pose.
 pub(super) fn follow_plan(supplies: &mut [TouchSupply<'_>], names: &[String], plan: &Plan<'_>) -> Result<()> {
     let poses = plan.poses();
     for supply in &mut *supplies {
         for pool in &mut supply.pools {
             let mut by_pose = vec![Vec::new(); poses.count().into()];
             for &touch in pool.order.iter().rev() {
-                let no_pose =
-                    || EvaluateProblem::NoPoseOf { object: names.get(supply.object).cloned().unwrap_or_default() };
+                let no_pose = || no_pose_of(names.get(supply.object).map_or("", String::as_str));
                 let pose = supply.feed.given(touch).and_then(Touch::pose).ok_or_else(no_pose)?;
                 by_pose[usize::from(poses.number_of(&pose))].push(touch);
             }

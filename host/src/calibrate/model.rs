@@ -12,8 +12,8 @@ use super::terms::Terms;
 use super::{Limit, Per, Tally};
 use crate::compile;
 use crate::ensemble::StatedProbe;
-use crate::error::{CalibrateProblem, Error, EvaluateProblem, Result, Supplied};
-use crate::evaluate::{Candidate, OfTouches};
+use crate::error::{CalibrateProblem, Error, Result, Supplied};
+use crate::evaluate::{Candidate, OfTouches, check_approaches, no_plan};
 use crate::evidence::{Odds, Sequence, odds_of, totals};
 use crate::probe::noise::Noise;
 use crate::progress::Progress;
@@ -187,10 +187,8 @@ impl<'m> Material<'m> {
         if !self.settings.active {
             return Ok(());
         }
-        let plan = self.model.plan().ok_or(EvaluateProblem::NoPlan)?;
-        if !dataset.holds_approaches() {
-            return Err(EvaluateProblem::NoApproaches.into());
-        }
+        let plan = self.model.plan().ok_or_else(no_plan)?;
+        check_approaches(dataset)?;
         follow_plan(supplies, &self.names, &plan)
     }
 

@@ -1,7 +1,8 @@
 //! A capture that stays in memory.
 
+use super::pipeline::too_few_threads;
 use super::{Sampler, Settings, scenes, sources};
-use crate::error::{CaptureProblem, Result};
+use crate::error::Result;
 use crate::in_order::in_order;
 use crate::mesh::Object;
 use crate::progress::{self, Progress};
@@ -24,10 +25,8 @@ pub fn in_memory(objects: &[Object], settings: &Settings, progress: &dyn Progres
     let mut objects: Vec<&Object> = objects.iter().collect();
     objects.sort_by(|a, b| a.name.cmp(&b.name));
     let threads = settings.threads();
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| {
-        let message = error.to_string();
-        CaptureProblem::Threads { asked: threads, started: 0, message }
-    })?;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = pool.map_err(|error| too_few_threads(0, threads, &error))?;
     pool.install(|| touch(&objects, settings, progress))
 }
 

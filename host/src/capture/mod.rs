@@ -24,7 +24,6 @@
 //! # }
 //! ```
 
-pub(crate) mod error;
 mod memory;
 mod pipeline;
 mod sample;
@@ -33,7 +32,7 @@ mod table_tests;
 #[cfg(test)]
 mod tests;
 
-use crate::error::{CaptureProblem, Error, Kind, Place, Result};
+use crate::error::{Error, Kind, Place, Result, problem};
 use crate::in_order::in_order;
 use crate::mesh::{Instance, Object, placements};
 use crate::output::Folder;
@@ -41,6 +40,7 @@ use crate::probe::approach::FINGERS;
 use crate::probe::scene::{Scene, Table};
 use crate::progress::{self, Progress};
 use crate::touches::{Entry, Listing, Lying, ObjectTouches, Origin, Source};
+use crate::wording::first_ten;
 use palpate_shared::format::Length;
 use rayon::prelude::*;
 use std::fs::DirEntry;
@@ -145,9 +145,7 @@ pub fn capture(objects: &[Object], settings: &Settings, directory: &Path, progre
         .zip(&scenes)
         .map(|(object, scenes)| Sampler::of_instances(scenes, &object.name, &settings.origin))
         .collect();
-    if let Some(problem) = untouched(&samplers, &settings.origin)? {
-        return Err(problem.into());
-    }
+    untouched(&samplers, &settings.origin).map_or(Ok(()), Err)?;
     let entries = objects.iter().zip(&scenes).map(|(object, scenes)| entry(object, scenes, &settings.origin)).collect();
     let mut listing = Listing { objects: entries, ..Listing::new(&settings.origin, []) };
     let replaced = replaced(directory, &listing, settings.force)?;
@@ -161,8 +159,8 @@ pub fn capture(objects: &[Object], settings: &Settings, directory: &Path, progre
 /// The names of the files in the directory that a capture with this listing replaces.
 ///
 /// # Errors
-/// [`CaptureProblem::HoldsRecorded`]; [`CaptureProblem::HoldsOthers`] if something else than this capture's own touches is there,
-/// unless it is forced.
+/// When recorded touches are there; [`Kind::Exists`] if something else than this capture's own touches is there, unless it is
+/// forced.
 fn replaced(directory: &Path, wanted: &Listing, force: bool) -> Result<Vec<String>> {
     let io = |source| Error::io(directory, "list", source);
     let there = match std::fs::read_dir(directory) {
@@ -172,7 +170,6 @@ fn replaced(directory: &Path, wanted: &Listing, force: bool) -> Result<Vec<Strin
     let name = |entry: std::io::Result<DirEntry>| Ok(entry.map_err(io)?.file_name().to_string_lossy().into_owned());
     let mut there: Vec<String> = there.map(name).collect::<Result<_>>()?;
     there.sort();
-    let refuse = |problem| Err(Error::variant_at(Place::file(directory), problem));
     let found = match Listing::read(directory) {
         // What cannot be read says nothing of other files.
         Err(error) if force && !error.is(&Kind::Io) => None,
@@ -181,8 +178,11 @@ fn replaced(directory: &Path, wanted: &Listing, force: bool) -> Result<Vec<Strin
     let mut own = vec![Listing::FILE.to_owned()];
     if let Some(found) = &found {
         if found.is_recorded() {
-            let (objects, touches) = (found.names(), found.objects.iter().map(|entry| entry.touches).sum());
-            return refuse(CaptureProblem::HoldsRecorded { objects, touches });
+            // No capture could make them again.
+            let touches: u64 = found.objects.iter().map(|entry| entry.touches).sum();
+            return Err(problem!("holds {touches} recorded touches of {}", first_ten(&found.names()))
+                .fix("Give another directory: recorded and simulated touches are not mixed.")
+                .at(Place::file(directory)));
         }
         let file = |entry: &Entry| entry.file(Path::new("")).to_string_lossy().into_owned();
         own.extend(found.objects.iter().map(file));
@@ -195,17 +195,20 @@ fn replaced(directory: &Path, wanted: &Listing, force: bool) -> Result<Vec<Strin
     let is_same = found.is_some_and(|found| stated(&found) == stated(wanted));
     let others: Vec<String> = there.into_iter().filter(|name| !is_same || !own.contains(name)).collect();
     if !force && !others.is_empty() {
-        return refuse(CaptureProblem::HoldsOthers { files: others });
+        return Err(problem!("holds {}, which this capture would not write", first_ten(&others))
+            .fix("Give another directory, move these away, or replace the touches that are there.")
+            .as_kind(Kind::Exists)
+            .at(Place::file(directory)));
     }
     Ok(own)
 }
 
-/// The objects of these that cannot be touched with all fingers, as [`CaptureProblem::Untouchable`]; none if all can, or if every
-/// approach is kept.
+/// The objects of these that cannot be touched with all fingers, as [`Kind::Untouchable`]; none if all can, or if every approach
+/// is kept.
 ///
 /// # Errors
 /// Errors of [`scenes`].
-pub fn untouchable(objects: &[Object], origin: &Origin, progress: &dyn Progress) -> Result<Option<CaptureProblem>> {
+pub fn untouchable(objects: &[Object], origin: &Origin, progress: &dyn Progress) -> Result<Option<Error>> {
     let objects: Vec<&Object> = objects.iter().collect();
     let scenes = scenes(&objects, origin, progress)?;
     let samplers: Vec<Sampler<'_>> = objects
@@ -213,28 +216,15 @@ pub fn untouchable(objects: &[Object], origin: &Origin, progress: &dyn Progress)
         .zip(&scenes)
         .map(|(object, scenes)| Sampler::of_instances(scenes, &object.name, origin))
         .collect();
-    untouched(&samplers, origin)
+    Ok(untouched(&samplers, origin))
 }
 
-fn untouched(samplers: &[Sampler<'_>], origin: &Origin) -> Result<Option<CaptureProblem>> {
+fn untouched(samplers: &[Sampler<'_>], origin: &Origin) -> Option<Error> {
     if origin.approaches {
-        return Ok(None);
+        return None;
     }
-    let tried: Vec<Result<()>> = samplers.par_iter().map(Sampler::try_each).collect();
-    let mut all: Option<CaptureProblem> = None;
-    for error in tried.into_iter().filter_map(Result::err) {
-        match (error.problem::<CaptureProblem>().cloned(), &mut all) {
-            (
-                Some(CaptureProblem::Untouchable { objects: more, .. }),
-                Some(CaptureProblem::Untouchable { objects, .. }),
-            ) => {
-                objects.extend(more);
-            }
-            (Some(problem @ CaptureProblem::Untouchable { .. }), all) => *all = Some(problem),
-            _ => return Err(error),
-        }
-    }
-    Ok(all)
+    let objects: Vec<_> = samplers.par_iter().filter_map(Sampler::untouched).collect();
+    (!objects.is_empty()).then(|| sample::untouchable(&objects, origin))
 }
 
 /// Entry of the listing for an object before it is touched.
@@ -262,8 +252,7 @@ fn named(object: &Object) -> Vec<String> {
 pub fn scenes(objects: &[&Object], origin: &Origin, progress: &dyn Progress) -> Result<Vec<Vec<Scene>>> {
     let in_object = |object: &Object, error: Error| error.within(format_args!("{}: ", object.name));
     let length = |(object, instance): (&Object, &Instance)| -> Result<f64> {
-        let unknown = || CaptureProblem::NoTrueSize { name: object.name.clone() };
-        let length = origin.length_of(object, instance).ok_or_else(unknown)?;
+        let length = origin.length_of(object, instance)?;
         // A mesh without extent is refused below, with a better reason. Rotated, its box may be longer.
         if length > 0.0 {
             let longest = if origin.scene.is_floating() { length } else { length * 3_f64.sqrt() };

@@ -5,14 +5,15 @@
 //! ahead waits, so at most a few chunks are in memory regardless of the number of touches.
 
 use super::{ObjectSummary, Sampler, Settings};
-use crate::error::{CaptureProblem, Error, Place, Result};
+use crate::error::{Error, Place, Result, problem};
 use crate::probe::approach::FINGERS;
 use crate::progress::{self, Progress};
 use crate::touches::{CRC, Entry, write_touch};
 use crossbeam_channel::{Receiver, Sender, bounded};
 use palpate_shared::ContactPattern;
+use std::fmt::Display;
 use std::fs::File;
-use std::io::Write as _;
+use std::io::{ErrorKind, Write as _};
 use std::ops::Range;
 use std::path::Path;
 use std::time::Instant;
@@ -62,10 +63,8 @@ pub(super) fn run(
             };
             // A system that is out of threads must not end in a panic. The threads that did start end without having
             // worked: nobody tells them to go.
-            std::thread::Builder::new().spawn_scoped(scope, work).map_err(|error| {
-                let message = error.to_string();
-                CaptureProblem::Threads { asked: threads, started: producer, message }
-            })?;
+            let started = std::thread::Builder::new().spawn_scoped(scope, work);
+            started.map_err(|error| too_few_threads(producer, threads, &error))?;
             channels.push(receiver);
         }
         for _ in 0..threads {
@@ -124,8 +123,16 @@ fn chunks(objects: usize, samples: &Range<u64>) -> impl Iterator<Item = (usize, 
 }
 
 fn not_written(path: &Path, error: &std::io::Error) -> Error {
-    let problem = CaptureProblem::NotWritten { kind: error.kind(), message: error.to_string() };
-    Error::variant_at(Place::file(path), problem)
+    let fix = match error.kind() {
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => "Free some space, then repeat the capture.",
+        _ => "Check the disk, then repeat the capture.",
+    };
+    problem!("cannot write the touches: {error}").fix(fix).at(Place::file(path))
+}
+
+/// The problem of an operating system that refuses a thread.
+pub(super) fn too_few_threads(started: usize, asked: usize, refusal: &impl Display) -> Error {
+    problem!("the system started only {started} of {asked} threads ({refusal})").fix("Use fewer threads.")
 }
 
 /// Computes chunks until they are all done, one fails, the capture is cancelled or the writer is started.
@@ -161,5 +168,5 @@ fn compute(sampler: &Sampler<'_>, settings: &Settings, samples: Range<u64>, prog
 
 fn receive(channel: &Receiver<Result<Chunk>>) -> Result<Chunk> {
     // A producer only goes away early by a panic, which the scope passes on.
-    channel.recv().unwrap_or_else(|_| Err(CaptureProblem::WorkerStopped.into()))
+    channel.recv().unwrap_or_else(|_| Err(problem!("a worker stopped").fix("Report this as a bug.")))
 }

@@ -3,8 +3,7 @@
 //! The stream of random numbers must stay the same, byte for byte: data sets are put together from parts and compared
 //! across versions. It is therefore not one of the streams of `random`.
 
-use super::error::Untouched;
-use crate::error::{CaptureProblem, Result};
+use crate::error::{Error, Kind, Result, problem};
 use crate::mesh::facts::sides;
 use crate::probe::approach::{Approach, FINGERS};
 use crate::probe::hand;
@@ -69,7 +68,7 @@ impl<'a> Sampler<'a> {
     /// approaches are drawn until one is a full touch; when every approach is kept, the first one is the sample.
     ///
     /// # Errors
-    /// [`CaptureProblem::Untouchable`] when 4 million approaches give no full touch.
+    /// [`Kind::Untouchable`] when 4 million approaches give no full touch.
     pub fn sample(&self, index: u64) -> Result<(Touch, u64)> {
         self.drawn(index).map(|drawn| (drawn.touch, drawn.approaches))
     }
@@ -79,11 +78,16 @@ impl<'a> Sampler<'a> {
     /// # Errors
     /// Errors of [`sample`](Self::sample).
     pub(crate) fn drawn(&self, index: u64) -> Result<Drawn> {
+        self.attempt(index).map_err(|size| untouchable(&[(self.name, size)], self.origin))
+    }
+
+    /// Sample `index`, or the size of the object, if it cannot be touched with all fingers.
+    fn attempt(&self, index: u64) -> Result<Drawn, DVec3> {
         let mut rng = self.rng(index);
         let probe = &self.origin.probe;
         let turn = index % self.scenes.len().max(1) as u64;
         let scene = usize::try_from(turn).ok().and_then(|turn| self.scenes.get(turn));
-        let scene = scene.ok_or_else(|| self.untouchable(DVec3::ZERO))?;
+        let scene = scene.ok_or(DVec3::ZERO)?;
         // What the real probe adds has a stream of its own, so that the approaches stay the same with it and without.
         let mut added = (!self.origin.real.is_none())
             .then(|| random::generator(self.origin.seed, Purpose::Capture, self.name, index));
@@ -117,31 +121,13 @@ impl<'a> Sampler<'a> {
             }
         }
         let [low, high] = scene.bounds();
-        Err(self.untouchable(high - low).into())
+        Err(high - low)
     }
 
-    /// The problem of an object of this size that cannot be touched with all fingers.
-    fn untouchable(&self, size: DVec3) -> CaptureProblem {
-        let Probe { radius, spacing, .. } = self.origin.probe;
-        let is_true_size = self.origin.unit == Length::Millimeter;
-        let unit = if is_true_size { "mm" } else { "units" };
-        CaptureProblem::Untouchable {
-            objects: vec![Untouched { name: self.name.into(), size: format!("{} {unit}", sides(size)) }],
-            approaches: MOST_ATTEMPTS,
-            span: format!("{} {unit}", 2.0 * spacing),
-            radius: format!("{radius} {unit}"),
-            is_true_size,
-        }
-    }
-
-    /// Samples of each of its scenes: where one of them cannot be touched, the object cannot be captured.
-    ///
-    /// # Errors
-    /// Errors of [`sample`](Self::sample).
-    pub(super) fn try_each(&self) -> Result<()> {
-        let samples = self.origin.samples();
-        let mut each = samples.take(self.scenes.len().max(1));
-        each.try_for_each(|sample| self.drawn(sample).map(drop))
+    /// The object's name and size, if one of its scenes cannot be touched with all fingers: it then cannot be captured.
+    pub(super) fn untouched(&self) -> Option<(&'a str, DVec3)> {
+        let mut each = self.origin.samples().take(self.scenes.len().max(1));
+        each.find_map(|sample| self.attempt(sample).err()).map(|size| (self.name, size))
     }
 
     /// The first approach that sample `index` draws, to this scene of the object: the sample itself where every approach is
@@ -162,6 +148,33 @@ impl<'a> Sampler<'a> {
     fn rng(&self, index: u64) -> Xoshiro256PlusPlus {
         Xoshiro256PlusPlus::seed_from_u64(mix(self.stream ^ mix(index)))
     }
+}
+
+/// The problem of objects, by name and size, that cannot be touched with all fingers.
+pub(super) fn untouchable(objects: &[(&str, DVec3)], origin: &Origin) -> Error {
+    let Probe { radius, spacing, .. } = origin.probe;
+    let is_true_size = origin.unit == Length::Millimeter;
+    let (unit, fix) = match is_true_size {
+        false => (
+            "units",
+            "Give a larger radius, a smaller spacing or a greater length, keep every approach, also those that miss, or leave \
+             the object out.",
+        ),
+        true => (
+            "mm",
+            "If that is not the size, state another unit of the mesh. Otherwise give a larger radius or a smaller spacing, keep \
+             every approach, also those that miss, or leave the object out.",
+        ),
+    };
+    let sized = |(name, size): &(&str, DVec3)| format!("{name} ({} {unit})", sides(*size));
+    problem!(
+        "{}: none of {MOST_ATTEMPTS} approaches touched with all three fingers, {} {unit} from the first to the third, of radius \
+         {radius} {unit}",
+        objects.iter().map(sized).collect::<Vec<_>>().join(", "),
+        2.0 * spacing
+    )
+    .fix(fix)
+    .as_kind(Kind::Untouchable { objects: objects.iter().map(|(name, _)| (*name).into()).collect(), is_true_size })
 }
 
 /// The finalizer of SplitMix64: every bit of the input changes about half of the output's.

@@ -262,8 +262,8 @@ impl StatedProbe {
     /// Cost: a pass over touches that no capture made.
     ///
     /// # Errors
-    /// Errors of [`compare`](Self::compare); recorded touches that show another stroke, with both strokes; and
-    /// [`TouchesProblem::TimeTooLong`](crate::error::TouchesProblem::TimeTooLong) for times that are not in seconds.
+    /// Errors of [`compare`](Self::compare); recorded touches that show another stroke, with both strokes; and times that are
+    /// not in seconds.
     pub fn compare_with(names: [&str; 2], probe: Option<TrainedProbe>, longest: u32, dataset: &Dataset) -> Result<()> {
         let own = Self::of(dataset).map(|own| own.trained());
         let is_simulated = own.is_some() && !dataset.is_recorded();

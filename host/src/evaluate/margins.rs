@@ -2,8 +2,9 @@
 
 use super::Candidate;
 use super::together::margins_of_touches;
+use super::unfit::raw_features;
 use crate::ensemble::{OverTouches, StatedProbe, TouchOrigin, feature_row, object_of, stroke_of};
-use crate::error::{Error, EvaluateProblem, Result};
+use crate::error::{Error, Result, problem};
 use crate::probe::hand;
 use crate::random::{self, Purpose};
 use crate::touches::{Dataset, ObjectTouches};
@@ -150,10 +151,11 @@ impl OfTouches for Candidate<'_> {
     }
 
     fn takes(&self, dataset: &Dataset) -> Result<Descriptor> {
-        let descriptor = self.descriptor().ok_or(EvaluateProblem::RawFeatures)?;
+        let descriptor = self.descriptor().ok_or_else(raw_features)?;
         let mut touches = dataset.touches();
         if descriptor.needs_pose() && !touches.any(|touch| touch.pose().is_some()) {
-            return Err(EvaluateProblem::NoPose { descriptor }.into());
+            return Err(problem!("the descriptor {} needs the probe's pose, which no touch has", descriptor.name())
+                .fix("Capture the touches with their pose."));
         }
         let longest = self.trained_touches().largest_spread;
         StatedProbe::compare_with(["the model", "the data set"], self.probe()?, longest, dataset)?;
@@ -183,9 +185,9 @@ impl OfTouches for Candidate<'_> {
                     true => self.outputs_of(object).into_iter().map(|output| known[output].clone()).collect(),
                     false => objects_of(&known, self.numbers().is_some()),
                 };
-                EvaluateProblem::UnknownObject { object: touched.name.clone(), known }
+                unknown_object(&touched.name, &known)
             };
-            self.outputs_of(&touched.name).first().copied().ok_or_else(|| unknown().into())
+            self.outputs_of(&touched.name).first().copied().ok_or_else(unknown)
         };
         Ok((descriptor, dataset.objects.iter().map(index).collect::<Result<_>>()?))
     }
@@ -197,6 +199,19 @@ impl OfTouches for Candidate<'_> {
     }
 }
 
+/// The problem of an object that is not among those that a model knows.
+fn unknown_object(object: &str, known: &[String]) -> Error {
+    let is_other_placement = |known: &String| known != object_of(known) && object_of(known) == object_of(object);
+    let fix = match known.iter().any(is_other_placement) {
+        true => {
+            "Train it on this placement too (capture with --placements), take it out of the data, or record the object without \
+             its placement (--object OBJECT), to test it however it lies."
+        }
+        false => "Train it on this object too, or take the object out of the data.",
+    };
+    problem!("the model does not know the object {object}, only {}", known.join(", ")).fix(fix)
+}
+
 impl<'m> Margins<'m> {
     /// Computes the margins of all touches that are evidence to the model, on all threads; the others cost an approach
     /// and change nothing. Every group and sequence that is drawn from them is of one source's touches, such as an
@@ -204,9 +219,8 @@ impl<'m> Margins<'m> {
     /// model may know more. Touches of an object with an output for each placement may be of any of them, if they state none.
     ///
     /// # Errors
-    /// If model and data set state different probes, or recorded touches show another stroke than the model's;
-    /// [`EvaluateProblem`] if the model does not know an object, works on rows of features instead of touches, or needs a
-    /// pose that no touch has.
+    /// If model and data set state different probes, or recorded touches show another stroke than the model's; if the model does
+    /// not know an object, works on rows of features instead of touches, or needs a pose that no touch has.
     pub fn new(candidate: Candidate<'m>, dataset: &Dataset) -> Result<Self> {
         let (descriptor, _) = candidate.of(dataset)?;
         let outputs = dataset.objects.iter().map(|touched| candidate.outputs_of(&touched.name)).collect();
@@ -216,12 +230,13 @@ impl<'m> Margins<'m> {
     /// Margins for objects that the model does not know: no verdict on them is right.
     ///
     /// # Errors
-    /// Errors of [`new`](Self::new), and [`EvaluateProblem::KnownObject`] if the model knows one.
+    /// Errors of [`new`](Self::new), and when the model knows one.
     pub(crate) fn of_strangers(candidate: Candidate<'m>, dataset: &Dataset) -> Result<Self> {
         let descriptor = candidate.takes(dataset)?;
         let is_known = |name: &&String| !candidate.outputs_of(name).is_empty();
         if let Some(object) = dataset.objects.iter().map(|object| &object.name).find(is_known) {
-            return Err(EvaluateProblem::KnownObject { object: object.clone() }.into());
+            return Err(problem!("the model knows the object {object}, so it is not a stranger")
+                .fix("Take it out of the strangers, or train a model without it."));
         }
         Ok(Self::with(candidate, descriptor, vec![Vec::new(); dataset.objects.len()], dataset))
     }

@@ -54,8 +54,7 @@ pub struct Evaluated {
 /// names and the model's own weights; `None` leaves these.
 ///
 /// # Errors
-/// Errors of [`evaluate`] and [`Margins::new`]; [`EvaluateProblem`](crate::error::EvaluateProblem) for a plan or strangers
-/// that cannot be evaluated; [`Kind::Setting`](crate::error::Kind::Setting) `at` for more touches than there are enough
+/// Errors of [`evaluate`] and [`Margins::new`]; for a plan or strangers that cannot be evaluated; [`Kind::Setting`](crate::error::Kind::Setting) `at` for more touches than there are enough
 /// different groups of.
 pub fn measure(
     candidate: Candidate<'_>,

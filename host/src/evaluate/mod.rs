@@ -37,7 +37,6 @@ mod approaches;
 mod cost_of_noise;
 mod curve;
 mod draws;
-pub(crate) mod error;
 mod full;
 mod margins;
 mod measure;
@@ -51,6 +50,7 @@ mod strangers;
 #[cfg(all(test, feature = "train"))]
 mod tests;
 pub mod together;
+mod unfit;
 
 pub use crate::evidence::Outcome;
 use approaches::Accuracies;
@@ -71,13 +71,15 @@ pub use noisy::add_noise;
 pub use palpate_trees::verify::{
     self, Candidate, Classes, Estimate, Regression, RowsEvaluation, evaluate_rows, predict,
 };
-pub use plan::{ActiveFacts, Hardest, Planned, plan};
+pub use plan::{ActiveFacts, Hardest, Planned, no_plan, plan};
+pub(crate) use plan::{check_approaches, no_pose_of};
 pub(crate) use promise::by_theory;
 pub use promise::{AlarmCheck, Finding, PromiseCheck};
 pub(crate) use sequential::significant;
 pub use sequential::{Sequential, SequentialSettings};
 pub use strangers::OnStrangers;
 pub(crate) use strangers::strangers;
+pub use unfit::{over_touches, raw_features, too_many_objects};
 
 use crate::error::{Error, Result};
 use crate::probe::noise::Noise;

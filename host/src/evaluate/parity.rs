@@ -4,8 +4,9 @@ use super::Candidate;
 use super::full::FullRecognizer;
 use super::margins::{OfTouches, best, row};
 use super::together::margins_of_touches;
+use super::unfit::{raw_features, too_many_objects};
 use crate::ensemble::{Ensemble, OverTouches};
-use crate::error::{EvaluateProblem, Result};
+use crate::error::{Result, problem};
 use crate::evidence::Follower;
 use crate::progress::{self, Progress};
 use crate::random::{self, Purpose};
@@ -41,7 +42,7 @@ const CAPACITY: usize = 256;
 /// touches drawn at random from those of one object's source, such as an instance, until there is a verdict. Both models stop by the compiled model's own rule.
 ///
 /// # Errors
-/// [`EvaluateProblem`] when the two are not of the same objects and descriptor, their margins differ by more than the model
+/// When the two are not of the same objects and descriptor, their margins differ by more than the model
 /// states (it was exported from another ensemble), or an object of the data set has no touches; [`Kind::Cancelled`](crate::error::Kind::Cancelled).
 pub fn parity(
     ensemble: &Ensemble,
@@ -52,7 +53,9 @@ pub fn parity(
     progress: &dyn Progress,
 ) -> Result<Parity> {
     if dataset.objects.is_empty() || dataset.objects.iter().any(ObjectTouches::is_empty) {
-        return Err(EvaluateProblem::NoTouches.into());
+        return Err(
+            problem!("there are no touches to compare the models on").fix("Give at least one touch of each object.")
+        );
     }
     let delivered = Candidate::Compiled(model).delivered(dataset);
     let dataset = delivered.as_ref();
@@ -66,7 +69,11 @@ pub fn parity(
     let Difference { max_margin_error, best_differs } = margins.reduce(Difference::default, Difference::worse);
     let stated_bound = f64::from(model.margin_error());
     if max_margin_error > stated_bound {
-        return Err(EvaluateProblem::NotExported { found: max_margin_error, stated: stated_bound }.into());
+        return Err(problem!(
+            "not exported from this ensemble: margins differ by up to {max_margin_error:.2e} nats, where the model states \
+             {stated_bound:.2e} at most"
+        )
+        .fix(OTHER_ENSEMBLE));
     }
     // Sequences draw the same touches again and again: whether each is evidence, and its margins, are found once.
     let trained = model.trained_touches();
@@ -144,9 +151,7 @@ impl FullMargins {
 /// Compares a compiled model's margins with its ensemble's, touch by touch, on all threads.
 ///
 /// # Errors
-/// [`EvaluateProblem::OtherModel`] when the two are not of the same objects and descriptor;
-/// [`EvaluateProblem::RawFeatures`] for an ensemble over rows;
-/// [`Kind::Cancelled`](crate::error::Kind::Cancelled).
+/// When the two are not of the same objects and descriptor, or over rows; [`Kind::Cancelled`](crate::error::Kind::Cancelled).
 pub fn difference(
     ensemble: &Ensemble,
     model: &Model<'_>,
@@ -164,13 +169,17 @@ pub fn difference(
     compared.try_reduce(Difference::default, |a, b| Ok(a.worse(b)))
 }
 
+/// Remedy for a model of another ensemble.
+const OTHER_ENSEMBLE: &str = "Give the ensemble that the model was exported from.";
+
 fn check(ensemble: &Ensemble, model: &Model<'_>) -> Result<()> {
     if ensemble.descriptor().is_none() {
-        return Err(EvaluateProblem::RawFeatures.into());
+        return Err(raw_features());
     }
     let names = (0..model.object_count()).map(|object| model.object_name(object));
     if model.descriptor() != ensemble.descriptor() || !names.eq(ensemble.objects.iter().map(String::as_str)) {
-        return Err(EvaluateProblem::OtherModel.into());
+        return Err(problem!("the model was not compiled from this ensemble: its objects or its descriptor differ")
+            .fix(OTHER_ENSEMBLE));
     }
     Ok(())
 }
@@ -187,15 +196,14 @@ fn compare_margins(full: &[f32], model: &Model<'_>, compiled: &[i32]) -> Differe
 /// counted by either.
 ///
 /// # Errors
-/// [`EvaluateProblem::TooManyObjects`] if the model has more than `N` objects.
+/// When the model has more than `N` objects.
 fn compare_verdicts<'t, const N: usize>(
     ensemble: &Ensemble,
     model: &Model<'_>,
     mut draw: impl Iterator<Item = Option<(&'t [f32], &'t [i32])>>,
 ) -> Result<(usize, usize)> {
     let stopping = Stopping::from_model(model);
-    let mut compiled = Recognizer::<N>::new(model, stopping)
-        .map_err(|error| EvaluateProblem::TooManyObjects { objects: error.objects, capacity: error.capacity })?;
+    let mut compiled = Recognizer::<N>::new(model, stopping).map_err(too_many_objects)?;
     let prior = |object| f64::from(model.prior(object)) * f64::from(model.unit());
     let priors = (0..ensemble.objects.len()).map(prior).collect();
     let mut full = {
@@ -238,11 +246,8 @@ mod tests {
         train(&synthetic::dataset(&[200, 200, 200], 1), &settings, &()).unwrap()
     }
 
-    fn problem<T>(result: Result<T>) -> EvaluateProblem {
-        match result.err().unwrap().problem() {
-            Some(problem) => EvaluateProblem::clone(problem),
-            other => panic!("{other:?}"),
-        }
+    fn error<T>(result: Result<T>) -> String {
+        result.err().unwrap().what().to_owned()
     }
 
     #[test]
@@ -255,8 +260,8 @@ mod tests {
         let mut compiled = [0; 3];
         model.margins(&touch, &mut compiled);
         let touches = || std::iter::repeat(Some((&margins[..], &compiled[..])));
-        let error = problem(compare_verdicts::<2>(&ensemble, &model, touches()));
-        assert_eq!(error, EvaluateProblem::TooManyObjects { objects: 3, capacity: 2 });
+        let error = error(compare_verdicts::<2>(&ensemble, &model, touches()));
+        assert_eq!(error, "the model has 3 objects, and the recognizer has room for 2");
         assert_eq!(compare_verdicts::<3>(&ensemble, &model, touches()).unwrap(), (0, 0));
     }
 
@@ -267,7 +272,8 @@ mod tests {
         let model = compile::open(&bytes).unwrap();
         for counts in [&[][..], &[0, 0], &[5, 0]] {
             let dataset = synthetic::dataset(counts, 1);
-            assert_eq!(problem(parity(&ensemble, &model, &dataset, 10, 1, &())), EvaluateProblem::NoTouches);
+            let error = error(parity(&ensemble, &model, &dataset, 10, 1, &()));
+            assert_eq!(error, "there are no touches to compare the models on");
         }
     }
 
@@ -295,6 +301,7 @@ mod tests {
         let bytes = compile(&other, &compile::Settings::default()).unwrap().bytes;
         let model = compile::open(&bytes).unwrap();
         let dataset = synthetic::dataset(&[5, 5, 5], 1);
-        assert_eq!(problem(parity(&ensemble, &model, &dataset, 10, 1, &())), EvaluateProblem::OtherModel);
+        let error = error(parity(&ensemble, &model, &dataset, 10, 1, &()));
+        assert!(error.starts_with("the model was not compiled from this ensemble"), "{error}");
     }
 }

@@ -33,7 +33,8 @@ pub use pack::{compress, decompress, pack, unpack};
 pub use table::{Ghost, Hidden, Pressed};
 
 use crate::capture::Sampler;
-use crate::error::{EvaluateProblem, Result};
+use crate::error::Result;
+use crate::evaluate::raw_features;
 use crate::mesh::Mesh;
 use crate::probe::approach::{Approach, FINGERS};
 use crate::probe::hand::{self, Unreached};
@@ -120,10 +121,10 @@ impl<'m> Game<'m> {
     /// Adds a model, which takes part in rounds from the next on; returns its number.
     ///
     /// # Errors
-    /// [`EvaluateProblem::RawFeatures`] for a model over rows of features.
+    /// When the model is over rows of features.
     pub fn add_model(&mut self, model: Model<'m>) -> Result<usize> {
         if model.descriptor().is_none() {
-            return Err(EvaluateProblem::RawFeatures.into());
+            return Err(raw_features());
         }
         self.models.push(model);
         Ok(self.models.len() - 1)

@@ -29,7 +29,7 @@ pub use shapes::captured;
 
 use crate::calibrate::{Found, allowed, needed};
 use crate::compile::{self, Restated, restate};
-use crate::error::{Error, EvaluateProblem, Result};
+use crate::error::{Error, Kind, Result, problem};
 use crate::evaluate::together::margins_of_touches;
 use crate::evaluate::{Candidate, OfTouches};
 use crate::touches::{Dataset, ObjectTouches, Pool};
@@ -145,7 +145,7 @@ impl Pools {
 /// this test and does not hold with it: the model states it no more. [`calibrate_with_promise`] finds both.
 ///
 /// # Errors
-/// [`EvaluateProblem`] as for an evaluation, and for too few touches; [`Kind::Setting`](crate::error::Kind::Setting)
+/// Those of an evaluation; [`Kind::TooFew`] for too few touches, [`Kind::TooManyAlarms`]; [`Kind::Setting`]
 /// for shares that are none.
 pub fn calibrate(
     model: &Model<'_>,
@@ -170,8 +170,12 @@ pub(crate) fn calibrate_supplies(
     let (learn, test) = learned_and_tested(given, objects);
     let known = model.known_count();
     let moments = Moments::new(&learn, shapes, known, objects, unit);
-    let misfits =
-        misfit::misfits(&moments).ok_or(EvaluateProblem::TooFewForMisfit { found: learn_count(&learn, objects) })?;
+    let misfits = misfit::misfits(&moments).ok_or_else(|| {
+        let found = learn_count(&learn, objects);
+        problem!("an object has only {found} touches to learn the expected evidence from, or they are all alike")
+            .fix(MORE_TOUCHES)
+            .as_kind(Kind::TooFew)
+    })?;
     let terms = |threshold: f64| terms(settings, &misfits, threshold);
     // Levels of misfit do not depend on any threshold.
     let untested = stated(model, &terms(0.0), &misfits)?;
@@ -191,11 +195,8 @@ pub(crate) fn calibrate_supplies(
         let needed = needed(settings.alarms, settings.confidence).div_ceil(objects as u64);
         let names = compile::names(model);
         let fewest = (0..sequences.len()).min_by_key(|&object| sequences[object].len());
-        EvaluateProblem::TooFewForAlarms {
-            object: fewest.and_then(|object| names.get(object).cloned()).unwrap_or_default(),
-            object_sequences: all.len() / objects,
-            needed,
-        }
+        let object = fewest.and_then(|object| names.get(object)).map_or("", String::as_str);
+        no_threshold(object, (all.len() / objects) as u64, needed)
     })?;
     let [alarms, touches] = tried.ends(&all, threshold);
     let terms = MisfitTerms { sequences: u32::try_from(all.len()).unwrap_or(u32::MAX), ..terms(threshold) };
@@ -208,6 +209,29 @@ pub(crate) fn calibrate_supplies(
         mean_touches: mean(touches),
         mean_touches_without: mean(all.iter().map(|sequence| u64::from(sequence.decided_after())).sum()),
     })
+}
+
+/// Remedy for too few touches.
+const MORE_TOUCHES: &str = "Capture more touches of every object.";
+
+/// The problem of a test without a threshold: `found` sequences of each object are too few, where it takes `needed`, or too many
+/// of them end as unknown. The object with the fewest sequences is named.
+fn no_threshold(object: &str, found: u64, needed: u64) -> Error {
+    if found >= needed {
+        return problem!(
+            "of {found} sequences of each object too many end as unknown at every threshold, so the promise takes more sequences"
+        )
+        .fix(MORE_TOUCHES)
+        .as_kind(Kind::TooManyAlarms { sequences: found });
+    }
+    let times = needed as f64 / found as f64;
+    let fix = match found {
+        0 => MORE_TOUCHES.into(),
+        _ => format!("Capture about {:.1} times as many touches of {object}.", (10.0 * times).ceil() / 10.0),
+    };
+    problem!("the touches make only {found} sequences of {object}, and the promise takes at least {needed}")
+        .fix(fix)
+        .as_kind(Kind::TooFew)
 }
 
 /// `as` saturates.
@@ -286,7 +310,10 @@ fn supplies(model: &Model<'_>, dataset: &Dataset, seed: u64) -> Result<Vec<Pools
     let names = compile::names(model);
     let known = &names[..model.known_count()];
     let of_name = |name: &String| {
-        let missing = || EvaluateProblem::MissingObject { object: name.clone() };
+        let missing = || {
+            problem!("there are no touches of {name}, which the model knows")
+                .fix("Capture touches of every object that the model knows.")
+        };
         let touched = dataset.objects.iter().find(|object| object.name == *name).ok_or_else(missing)?;
         Ok(supply(model, touched, seed))
     };

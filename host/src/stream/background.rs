@@ -5,7 +5,7 @@ use super::parts::Parts;
 use super::settings::StrangerTest;
 use crate::calibrate::{Found, needed, odds_of};
 use crate::compile::{self, Restated, restate};
-use crate::error::{CalibrateProblem, Error, EvaluateProblem, Result};
+use crate::error::{CalibrateProblem, Error, Kind, Result};
 use crate::strangers::{self, Pools};
 use palpate_shared::format::Tag;
 use palpate_trees::rows::RowSequence;
@@ -62,13 +62,9 @@ pub(super) fn test<'s>(
 /// The problem of a test that sequences are too few for, in numbers of these.
 fn problem(error: Error, parts: &Parts<'_>, settings: &strangers::Settings) -> Error {
     let strangers::Settings { alarms, confidence, .. } = *settings;
-    match error.problem() {
-        Some(&EvaluateProblem::TooFewForAlarms { object_sequences, needed, .. })
-            if object_sequences as u64 >= needed =>
-        {
-            CalibrateProblem::TooManyAlarms { found: object_sequences as u64, alarms }.into()
-        }
-        Some(EvaluateProblem::TooFewForAlarms { .. } | EvaluateProblem::TooFewForMisfit { .. }) => {
+    match *error.kind() {
+        Kind::TooManyAlarms { sequences } => CalibrateProblem::TooManyAlarms { found: sequences, alarms }.into(),
+        Kind::TooFew => {
             // Three quarters of the part that is for the test are tested on.
             let needed = needed(alarms, confidence) as f64 / (0.75 * TESTED * parts.share_tested());
             let needed = needed.ceil() as u64;

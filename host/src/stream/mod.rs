@@ -40,7 +40,8 @@ pub use settings::Settings;
 #[cfg(feature = "train")]
 pub use settings::StrangerTest;
 
-use crate::error::{EvaluateProblem, Result, problem};
+use crate::error::{Result, problem};
+use crate::evaluate::over_touches;
 use crate::evaluate::together::units_of_rows;
 use palpate_onboard::{Model, Refused, RowsSeen};
 use palpate_shared::format::Position;
@@ -127,10 +128,10 @@ impl<'r> Rows<'r> {
 /// Refuses a model that has no classes of rows.
 ///
 /// # Errors
-/// [`EvaluateProblem::OverTouches`], and for a model of one output.
+/// When the model is over touches, and for a model of one output.
 pub fn check(model: &Model<'_>) -> Result<()> {
     if model.descriptor().is_some() {
-        return Err(EvaluateProblem::OverTouches.into());
+        return Err(over_touches());
     }
     if model.known_count() < 2 {
         return Err(problem!(

@@ -65,7 +65,7 @@ fn names(ensemble: &Ensemble, recorded: &Dataset) -> Result<()> {
     let names: Vec<String> = ensemble.objects.iter().cloned().chain(recorded.names()).collect();
     crate::ensemble::check_names(&names)?;
     if names.len() > crate::ensemble::MAX_OBJECTS {
-        return Err(crate::error::TrainProblem::TooManyObjects { objects: names.len() }.into());
+        return Err(crate::ensemble::train::too_many_objects(names.len()));
     }
     Ok(())
 }

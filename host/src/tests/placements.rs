@@ -5,7 +5,7 @@ use crate::capture::{self, Settings};
 use crate::compile::{self, CompiledModel, compile};
 use crate::ensemble::train::{self, Outputs, train};
 use crate::ensemble::{Ensemble, StatedProbe, TouchOrigin};
-use crate::error::{CalibrateProblem, EvaluateProblem};
+use crate::error::CalibrateProblem;
 use crate::evaluate::{Candidate, Margins, SequentialSettings, parity};
 use crate::mesh::{Mesh, Object};
 use crate::teach;
@@ -248,8 +248,7 @@ fn an_object_that_is_known_in_any_placement_is_no_stranger() {
     let model = compiled.model();
     let strangers = touched(3, 600).only(|name| name == "rod");
     let refused = Margins::of_strangers(Candidate::Compiled(&model), &strangers).err().unwrap();
-    let known = EvaluateProblem::KnownObject { object: "rod".into() };
-    assert_eq!(refused.problem::<EvaluateProblem>(), Some(&known));
+    assert_eq!(refused.what(), "the model knows the object rod, so it is not a stranger");
 }
 
 #[test]

@@ -1,10 +1,10 @@
 //! A data set: a directory with one file per object.
 
+use super::alike::{Alike, other_position};
 use super::files::{EXTENSION, files};
-use super::text::Alike;
-use super::warning::Warning;
-use super::{Entry, Listing, Log, Longest, ObjectTouches, Origin, Recorded, Source, is_log, recording, text};
-use crate::error::{Error, Place, Result, TouchesProblem};
+use super::listing::{missing, other_count};
+use super::{Entry, Finding, Listing, Log, Longest, ObjectTouches, Origin, Recorded, Source, is_log, recording, text};
+use crate::error::{Error, Place, Result, problem};
 use crate::probe::approach::Probe;
 use crate::probe::hand;
 use crate::probe::noise::Noise;
@@ -24,7 +24,7 @@ pub struct Dataset {
     /// Origin of the touches, if known: a directory without `dataset.json` does not say.
     pub origin: Option<Origin>,
     /// Warnings from reading the data set: things that look wrong, but may be meant.
-    pub warnings: Vec<Warning>,
+    pub warnings: Vec<Finding>,
 }
 
 impl Dataset {
@@ -150,7 +150,7 @@ impl Dataset {
     /// `<object>.txt` and log (`<name>.mcap`, see [`Log::by_object`]; its content decides that a file is one). Touches of one object in several logs are joined in the order of the logs' names. The path of a log is a data
     /// set too.
     ///
-    /// A text file that was changed since its capture but has as many touches as stated is a [`Warning`].
+    /// A text file that was changed since its capture but has as many touches as stated is a warning.
     ///
     /// # Errors
     /// When the directory cannot be read, or holds fewer than two objects; when a listed file is
@@ -159,9 +159,9 @@ impl Dataset {
     pub fn read(directory: &Path) -> Result<Self> {
         let dataset = Self::read_any(directory)?;
         match dataset.objects.as_slice() {
-            [one] => {
-                Err(Error::variant_at(Place::file(directory), TouchesProblem::OneObject { name: one.name.clone() }))
-            }
+            [one] => Err(problem!("only one object here, {}, and nothing to distinguish it from", one.name)
+                .fix("Capture at least two objects into the directory.")
+                .at(Place::file(directory))),
             _ => Ok(dataset),
         }
     }
@@ -183,7 +183,7 @@ impl Dataset {
             },
         };
         match dataset.objects.is_empty() {
-            true => Err(Error::variant_at(Place::file(directory), TouchesProblem::NoObjects)),
+            true => Err(no_objects().at(Place::file(directory))),
             false => Ok(dataset),
         }
     }
@@ -191,15 +191,16 @@ impl Dataset {
     /// The touches of one file, as an object that is called like it.
     ///
     /// # Errors
-    /// [`TouchesProblem::NoFormat`] if the file's name says neither what it holds nor of which object; when the file
-    /// cannot be read, holds no touch, or has a wrong line.
+    /// When the file's name says neither what it holds nor of which object; when the file cannot be read, holds no touch, or
+    /// has a wrong line.
     pub fn read_file(path: &Path) -> Result<ObjectTouches> {
         let extension = path.extension().unwrap_or_default();
-        let wrong = |problem| Err(Error::variant_at(Place::file(path), problem));
         match path.file_stem().and_then(|stem| stem.to_str()) {
             Some(name) if extension == EXTENSION => Ok(ObjectTouches::new(name, text::read(path)?, Source::Object)),
-            _ if extension == PARQUET => wrong(TouchesProblem::Parquet),
-            _ => wrong(TouchesProblem::NoFormat),
+            _ if extension == PARQUET => Err(parquet(path)),
+            _ => Err(problem!("not a file of touches by its name")
+                .fix("Name it after the object, with the extension .txt.")
+                .at(Place::file(path))),
         }
     }
 
@@ -215,11 +216,7 @@ impl Dataset {
                 false => read_listed(entry, &path, &longest, &mut warnings)?,
             };
             if touches.first().is_some_and(|touch| touch.position().is_some() != listing.origin.position) {
-                let (has_position, others) = (!listing.origin.position, Listing::STATED);
-                return Err(Error::variant_at(
-                    Place::file(&path),
-                    TouchesProblem::OtherPosition { has_position, others },
-                ));
+                return Err(other_position(!listing.origin.position, Listing::STATED).at(Place::file(&path)));
             }
             // Of an object whose recording was interrupted before its first touch.
             if may_grow && touches.is_empty() {
@@ -235,7 +232,7 @@ impl Dataset {
     /// Every file of touches.
     fn found(directory: &Path) -> Result<Self> {
         if let Some(table) = of_extension(directory, PARQUET)?.first() {
-            return Err(Error::variant_at(Place::file(table), TouchesProblem::Parquet));
+            return Err(parquet(table));
         }
         let mut logs = logs(directory)?;
         let mut objects = BTreeMap::new();
@@ -252,8 +249,7 @@ impl Dataset {
         let (logged, warnings) = found_in(&logs)?;
         for (name, found) in logged {
             if let Some(Found { file, .. }) = objects.get(&name) {
-                let (file, other) = (file.clone(), found.file);
-                return Err(Error::variant_at(Place::file(directory), TouchesProblem::TwoFiles { name, file, other }));
+                return Err(two_files(&name, file, &found.file).at(Place::file(directory)));
             }
             objects.insert(name, found);
         }
@@ -313,19 +309,40 @@ impl Dataset {
 }
 
 /// Reads an object's file, and compares it with the listing.
-fn read_listed(entry: &Entry, path: &Path, longest: &Longest, warnings: &mut Vec<Warning>) -> Result<Vec<Touch>> {
-    let wrong = |problem| Error::variant_at(Place::file(path), problem);
+fn read_listed(entry: &Entry, path: &Path, longest: &Longest, warnings: &mut Vec<Finding>) -> Result<Vec<Touch>> {
     if !path.exists() {
-        return Err(wrong(TouchesProblem::Missing { name: entry.name.clone() }));
+        return Err(missing(&entry.name).at(Place::file(path)));
     }
     let (touches, found) = text::read_with_checksum(path, longest)?;
     if touches.len() as u64 != entry.touches {
-        return Err(wrong(TouchesProblem::OtherCount { stated: entry.touches, found: touches.len() as u64 }));
+        return Err(other_count(entry.touches, touches.len() as u64).at(Place::file(path)));
     }
     if entry.crc32.is_some_and(|stated| stated != found) {
-        warnings.push(Warning::Changed { path: path.into() });
+        warnings.push(changed(path));
     }
     Ok(touches)
+}
+
+/// The warning about a text file that has as many touches as `dataset.json` states, but was changed since its capture.
+pub(super) fn changed(path: &Path) -> Finding {
+    let what = format_args!("changed since its capture: its checksum is not the one in {}", Listing::FILE);
+    Finding::warning(path, what, "Capture it again if that is not meant.")
+}
+
+/// The problem of a directory without files of touches.
+pub(super) fn no_objects() -> Error {
+    problem!("no touches here (no .txt or .mcap file)").fix("Fill it with: palpate capture builtin -o DIR.")
+}
+
+/// The problem of an object that is in a log and in a file of lines, where no listing says which counts.
+pub(super) fn two_files(name: &str, file: &Path, other: &Path) -> Error {
+    problem!("two files of the object {name}: {} and {}", file.display(), other.display()).fix("Remove one of them.")
+}
+
+fn parquet(path: &Path) -> Error {
+    problem!("Parquet is not read")
+        .fix(format!("Instead, {}.", crate::gone::instead(".parquet").unwrap_or_default()))
+        .at(Place::file(path))
 }
 
 /// Touches of an object, and the file that has them, or the first of several.
@@ -335,7 +352,7 @@ struct Found {
 }
 
 /// Contents of logs by object, one log after the other, and the skipped channels.
-fn found_in(logs: &[PathBuf]) -> Result<(BTreeMap<String, Found>, Vec<Warning>)> {
+fn found_in(logs: &[PathBuf]) -> Result<(BTreeMap<String, Found>, Vec<Finding>)> {
     let (mut objects, mut warnings) = (BTreeMap::<String, Found>::new(), Vec::new());
     for file in logs {
         let log = Log::read(file)?;
@@ -354,12 +371,8 @@ fn found_in(logs: &[PathBuf]) -> Result<(BTreeMap<String, Found>, Vec<Warning>)>
 fn alike(found: &BTreeMap<String, Found>) -> Result<()> {
     let mut alike = Alike::default();
     for Found { touches, file } in found.values() {
-        let admit = |touch: &Touch| alike.admit(*touch).map(drop);
-        touches
-            .touches()
-            .iter()
-            .try_for_each(admit)
-            .map_err(|problem| Error::variant_at(Place::file(file), problem))?;
+        let mut touches = touches.touches().iter();
+        touches.try_for_each(|touch| alike.admit(touch)).map_err(|error| error.at(Place::file(file)))?;
     }
     Ok(())
 }
@@ -411,9 +424,9 @@ mod tests {
         directory
     }
 
-    fn problem(directory: &Path) -> TouchesProblem {
-        let error = Dataset::read(directory).unwrap_err();
-        error.problem::<TouchesProblem>().unwrap_or_else(|| panic!("{error}")).clone()
+    /// True if the directory is refused for this reason.
+    fn is_refused(directory: &Path, why: &str) -> bool {
+        Dataset::read(directory).unwrap_err().what() == why
     }
 
     #[test]
@@ -460,12 +473,13 @@ mod tests {
         let directory = captured();
         let path = directory.path().join("spoon.txt");
         std::fs::write(&path, "0 0 0 0 0 -1 1 0 0 1 2 3\n".repeat(3)).unwrap();
-        let other = |has_position, others| TouchesProblem::OtherPosition { has_position, others };
-        assert_eq!(problem(directory.path()), other(true, Listing::STATED));
+        let stated = "a position, where the touches that dataset.json states have none";
+        assert!(is_refused(directory.path(), stated));
         let mut listing = Listing::read(directory.path()).unwrap().unwrap();
         listing.origin.position = true;
         listing.write(directory.path()).unwrap();
-        assert_eq!(problem(directory.path()), other(false, Listing::STATED));
+        let stated = "no position, where the touches that dataset.json states have one";
+        assert!(is_refused(directory.path(), stated));
         std::fs::remove_file(Listing::path(directory.path())).unwrap();
         let error = Dataset::read(directory.path()).unwrap_err().to_string();
         assert!(error.contains("spoon.txt: a position, where the touches before it have none"), "{error}");
@@ -504,7 +518,7 @@ mod tests {
     fn a_missing_file_of_a_listed_object_is_an_error() {
         let directory = captured();
         std::fs::remove_file(directory.path().join("spoon.txt")).unwrap();
-        assert_eq!(problem(directory.path()), TouchesProblem::Missing { name: "spoon".into() });
+        assert!(is_refused(directory.path(), "missing, although dataset.json lists the object spoon"));
     }
 
     #[test]
@@ -512,13 +526,13 @@ mod tests {
         let directory = captured();
         let path = directory.path().join("spoon.txt");
         let text = std::fs::read_to_string(&path).unwrap();
-        for (touches, stated) in [(2, 3), (1, 3)] {
+        for touches in [2, 1] {
             let cut: String = text.split_inclusive('\n').take(touches).collect();
             std::fs::write(&path, cut).unwrap();
-            assert_eq!(problem(directory.path()), TouchesProblem::OtherCount { stated, found: touches as u64 });
+            assert!(is_refused(directory.path(), &format!("{touches} touches where dataset.json states 3")));
         }
         std::fs::write(&path, text.clone() + "0 0 0\n").unwrap();
-        assert_eq!(problem(directory.path()), TouchesProblem::OtherCount { stated: 3, found: 4 });
+        assert!(is_refused(directory.path(), "4 touches where dataset.json states 3"));
     }
 
     #[test]
@@ -528,7 +542,7 @@ mod tests {
         let text = std::fs::read_to_string(&path).unwrap().replace("0.000002", "0.000003");
         std::fs::write(&path, text).unwrap();
         let dataset = Dataset::read(directory.path()).unwrap();
-        assert_eq!(dataset.warnings, [Warning::Changed { path: path.clone() }]);
+        assert_eq!(dataset.warnings.len(), 1);
         assert!(dataset.warnings[0].to_string().contains("spoon.txt: changed since its capture"));
         assert_eq!(dataset.objects[1].touches()[2].times()[1].micros(), Some(3));
     }

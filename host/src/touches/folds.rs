@@ -1,6 +1,6 @@
 //! Training and test touches that share none: splits and cross-validation.
 
-use crate::error::{Error, Result, TouchesProblem};
+use crate::error::{Error, Result, problem};
 use crate::random::{self, Purpose};
 use crate::touches::{Dataset, ObjectTouches};
 use rand::seq::SliceRandom;
@@ -11,8 +11,7 @@ use std::ops::Range;
 /// seed give the same split.
 ///
 /// # Errors
-/// [`Kind::Setting`](crate::error::Kind::Setting) unless `test_share` is between 0 and 1; [`TouchesProblem::TooFew`] if an
-/// object has fewer than two touches.
+/// [`Kind::Setting`](crate::error::Kind::Setting) unless `test_share` is between 0 and 1; when an object has fewer than two touches.
 pub fn split(dataset: &Dataset, test_share: f64, seed: u64) -> Result<Split> {
     if !(test_share > 0.0 && test_share < 1.0) {
         return Err(Error::setting("test_share", test_share, "a number between 0 and 1"));
@@ -29,8 +28,8 @@ pub fn split(dataset: &Dataset, test_share: f64, seed: u64) -> Result<Split> {
 /// an object, give or take one; so it is with each of its instances or recordings, give or take two.
 ///
 /// # Errors
-/// [`Kind::Setting`](crate::error::Kind::Setting) unless there are at least two folds, and `fold` is one of them;
-/// [`TouchesProblem::TooFew`] if an object has fewer touches than there are folds.
+/// [`Kind::Setting`](crate::error::Kind::Setting) unless there are at least two folds, and `fold` is one of them; when an
+/// object has fewer touches than there are folds.
 pub fn fold(dataset: &Dataset, fold: usize, folds: usize, seed: u64) -> Result<Split> {
     if folds < 2 {
         return Err(Error::setting("folds", folds, "2 or more"));
@@ -53,7 +52,8 @@ pub struct Split {
 
 fn enough(dataset: &Dataset, least: usize) -> Result<()> {
     match dataset.objects.iter().find(|object| object.len() < least) {
-        Some(object) => Err(TouchesProblem::TooFew { name: object.name.clone(), touches: object.len(), least }.into()),
+        Some(object) => Err(problem!("{} has only {} touches, too few to split", object.name, object.len())
+            .fix(format!("Capture at least {least} touches of each object."))),
         None => Ok(()),
     }
 }
@@ -197,8 +197,7 @@ mod tests {
         };
         assert_eq!(setting(fold(&dataset(&[9, 9]), 10, 10, 1)), "fold");
         assert_eq!(setting(fold(&dataset(&[9, 9]), 0, 1, 1)), "folds");
-        let few = TouchesProblem::TooFew { name: "object0".into(), touches: 9, least: 10 };
-        let error = fold(&dataset(&[9, 9]), 0, 10, 1).unwrap_err();
-        assert_eq!(error.problem(), Some(&few));
+        let error = fold(&dataset(&[9, 9]), 0, 10, 1).unwrap_err().to_string();
+        assert!(error.contains("object0 has only 9 touches") && error.contains("at least 10 touches"), "{error}");
     }
 }

@@ -1,12 +1,12 @@
 //! `dataset.json`: the content and origin of a data set.
 
-use super::files::EXTENSION;
-use super::log::is_bag;
+use super::files::{EXTENSION, begin, check_name, refuse_bag};
 use super::{ObjectTouches, Origin, Recorded, Source};
-use crate::error::{Error, Place, Result, TouchesProblem};
+use crate::error::{Error, Place, Result, problem};
 use crate::output;
 use palpate_shared::Touch;
-use std::path::{Component, Path, PathBuf};
+use std::fmt::Display;
+use std::path::{Path, PathBuf};
 
 /// Contents of a data set's directory. The same capture writes the same bytes: no times of day, no durations. A
 /// recording says when it was made.
@@ -132,9 +132,9 @@ impl Listing {
     /// # Errors
     /// When the file cannot be read or is not a listing, and when it names an object twice or by a name that no file can have.
     pub fn read(directory: &Path) -> Result<Option<Self>> {
-        if directory.is_file() && is_bag(directory) {
-            return Err(Error::variant_at(Place::file(directory), TouchesProblem::Bag));
-        }
+        begin(directory)
+            .map_or(Ok(()), |bytes| refuse_bag(&bytes))
+            .map_err(|error| error.at(Place::file(directory)))?;
         let path = Self::path(directory);
         match std::fs::read(&path) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
@@ -148,17 +148,13 @@ impl Listing {
     /// # Errors
     /// Errors of [`read`](Self::read).
     pub fn parse(bytes: &[u8], path: &Path) -> Result<Self> {
-        let listing: Self = serde_json::from_slice(bytes).map_err(|error| {
-            let problem = TouchesProblem::BadListing { message: error.to_string() };
-            Error::variant_at(Place::line(path, error.line() as u64), problem)
-        })?;
+        let listing: Self = serde_json::from_slice(bytes)
+            .map_err(|error| not_a_listing(&error).at(Place::line(path, error.line() as u64)))?;
         let mut names: Vec<&str> = listing.objects.iter().map(|entry| entry.name.as_str()).collect();
         names.sort_unstable();
-        if let Some(&name) = names.iter().find(|name| !is_file_name(name)) {
-            return Err(Error::variant_at(Place::file(path), TouchesProblem::BadName { name: name.into() }));
-        }
+        names.iter().try_for_each(|name| check_name(name)).map_err(|error| error.at(Place::file(path)))?;
         if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
-            return Err(Error::variant_at(Place::file(path), TouchesProblem::ListedTwice { name: pair[0].into() }));
+            return Err(problem!("the object {} is listed twice", pair[0]).fix(FROM_ELSEWHERE).at(Place::file(path)));
         }
         Ok(listing)
     }
@@ -193,13 +189,12 @@ impl Listing {
         let stated = entry.counts.iter().try_fold(0_u64, |sum, &count| sum.checked_add(count));
         let sources = entry.sources();
         if entry.counts.len() != sources.len() || stated != Some(touches.len() as u64) {
-            let message = format!(
+            return Err(not_a_listing(format_args!(
                 "{name} has {} {} and {} touches, and counts that are not for these",
                 sources.len(),
                 if entry.placements.is_empty() { "instances" } else { "placements" },
                 touches.len()
-            );
-            return Err(TouchesProblem::BadListing { message }.into());
+            )));
         }
         let runs = sources.into_iter().zip(entry.counts.iter().copied()).collect();
         Ok(ObjectTouches::in_runs(name, touches, runs).of_origin(origin))
@@ -218,12 +213,24 @@ impl Entry {
     }
 }
 
-/// True if files of the directory itself can have this name.
-pub(super) fn is_file_name(name: &str) -> bool {
-    let mut components = Path::new(name).components();
-    !name.is_empty()
-        && !name.contains(['/', '\\', '\0'])
-        && matches!((components.next(), components.next()), (Some(Component::Normal(_)), None))
+/// Remedy for a `dataset.json` that cannot be read.
+const FROM_ELSEWHERE: &str = "Remove the file if the touches are from elsewhere, else capture them again.";
+
+fn not_a_listing(why: impl Display) -> Error {
+    problem!("not the listing of a data set ({why})").fix(FROM_ELSEWHERE)
+}
+
+/// Remedy for a file that differs from what `dataset.json` states.
+const RESTORE: &str = "Restore the file or capture the objects again, or remove dataset.json if this is meant.";
+
+/// The problem of a listed object whose file is not there.
+pub(super) fn missing(name: &str) -> Error {
+    problem!("missing, although dataset.json lists the object {name}").fix(RESTORE)
+}
+
+/// The problem of a file that has another number of touches than listed.
+pub(super) fn other_count(stated: u64, found: u64) -> Error {
+    problem!("{found} touches where dataset.json states {stated}").fix(RESTORE)
 }
 
 #[cfg(test)]
@@ -269,7 +276,7 @@ mod tests {
         for name in ["", "..", ".", "../fork", "/etc/fork", "a/b", "a\\\\b", "fork/"] {
             let text = PLAIN.replace("\"fork\"", &format!("\"{name}\""));
             let error = Listing::parse(text.as_bytes(), Path::new("dataset.json")).unwrap_err();
-            assert!(matches!(error.problem::<TouchesProblem>(), Some(TouchesProblem::BadName { .. })), "{error}");
+            assert!(error.to_string().contains("no file can be named after the object"), "{error}");
         }
     }
 

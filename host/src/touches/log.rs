@@ -1,16 +1,17 @@
 //! Touches out of a robot's log, which is an MCAP file: `docs/reference/mcap.md` says what belongs in it.
 
-use super::logged::{Channels, Message};
-use super::{Longest, ObjectTouches, Source, Warning, mcap, text};
-use crate::error::{Error, Place, Result, TouchesProblem};
+use super::alike::Alike;
+use super::files::is_log;
+use super::finding::Finding;
+use super::logged::{Channels, Message, too_large};
+use super::{Longest, ObjectTouches, Source, mcap, text};
+use crate::error::{Error, Place, Result, problem};
 use palpate_shared::Touch;
 use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// The first byte of an MCAP file. No text in UTF-8 begins with it.
-const FIRST: u8 = 0x89;
 /// More touches than this are refused: a probe that touches every second takes four months for them.
 const MOST: usize = 10_000_000;
 /// Largest size of all names of objects, in bytes.
@@ -36,32 +37,6 @@ pub struct Logged {
     pub offset: u64,
     /// The object's number among the log's.
     object: Option<u32>,
-}
-
-/// True if a file, or a stream, is a log, by how it begins.
-pub fn begins_log(bytes: &[u8]) -> bool {
-    bytes.first() == Some(&FIRST)
-}
-
-/// True if the file at `path` is a log, by its first byte; false for a file that cannot be read.
-pub fn is_log(path: &Path) -> bool {
-    begins(path, begins_log)
-}
-
-/// True if the file at `path` is a bag of ROS that is not in MCAP; false for a file that cannot be read.
-pub(super) fn is_bag(path: &Path) -> bool {
-    begins(path, begins_bag)
-}
-
-/// True if the first bytes of a file say so.
-fn begins(path: &Path, says: impl Fn(&[u8]) -> bool) -> bool {
-    let mut first = Vec::new();
-    path.is_file() && File::open(path).and_then(|file| file.take(16).read_to_end(&mut first)).is_ok() && says(&first)
-}
-
-/// True if a file that begins like this is a bag of ROS that is not in MCAP.
-pub(super) fn begins_bag(bytes: &[u8]) -> bool {
-    bytes.starts_with(b"#ROSBAG V") || bytes.starts_with(b"SQLite format 3\0")
 }
 
 /// The touches of a file: of a log, whichever objects they are of, or of lines of text.
@@ -96,14 +71,13 @@ impl Log {
     /// Errors of [`read`](Self::read).
     pub fn of(bytes: impl Read, path: &Path) -> Result<Self> {
         let (mut touches, mut objects, mut numbers, mut size) = (Vec::new(), Vec::new(), HashMap::new(), 0);
-        let mut alike = text::Alike::default();
+        let mut alike = Alike::default();
         let channels = mcap::read(bytes, path, |Message { time, offset, touch, object }| {
-            let wrong = |problem| Err(Error::variant_at(Place::byte(path, offset), problem));
-            if let Err(problem) = alike.admit(touch) {
-                return wrong(problem);
-            }
+            let at = |error: Error| error.at(Place::byte(path, offset));
+            alike.admit(&touch).map_err(at)?;
             if touches.len() == MOST {
-                return wrong(TouchesProblem::TooMany { most: MOST });
+                return Err(at(problem!("more than {MOST} touches")
+                    .fix("Divide the log: mcap filter LOG -o PART.mcap --start TIME --end TIME.")));
             }
             let object = match object {
                 None => None,
@@ -112,8 +86,7 @@ impl Log {
                     None => {
                         size += name.len();
                         if size > NAMES {
-                            let (what, bytes, most) = ("names of objects".into(), size as u64, NAMES as u64);
-                            return wrong(TouchesProblem::TooLarge { what, bytes, most });
+                            return Err(at(too_large("names of objects", size as u64, NAMES as u64)));
                         }
                         let number = objects.len() as u32;
                         objects.push(name.clone());
@@ -126,10 +99,10 @@ impl Log {
             Ok(())
         })?;
         if touches.is_empty() {
-            return Err(Error::variant_at(Place::file(path), TouchesProblem::NoTouches));
+            return Err(text::no_touches().at(Place::file(path)));
         }
         let checked = Longest::default().check_all(touches.iter().map(|logged| (logged.offset, &logged.touch)));
-        checked.map_err(|(offset, problem)| Error::variant_at(Place::byte(path, offset), problem))?;
+        checked.map_err(|(offset, error)| error.at(Place::byte(path, offset)))?;
         // Messages of one time stay in the order of the file.
         touches.sort_by_key(|logged| logged.time);
         Ok(Self { path: path.into(), touches, objects, channels })
@@ -150,16 +123,24 @@ impl Log {
         &self.channels
     }
 
-    /// Warning about skipped channels.
-    pub fn skipped(&self) -> Option<Warning> {
+    /// Names some of the skipped channels, and counts them.
+    pub fn skipped(&self) -> Option<Finding> {
+        const SHOWN: usize = 8;
         let channels = &self.channels.others;
-        (!channels.is_empty()).then(|| Warning::SkippedChannels { path: self.path.clone(), channels: channels.clone() })
+        let shown = channels.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join(", ");
+        let count = match channels.len() {
+            0 => return None,
+            1 => "1 other channel".to_owned(),
+            count => format!("{count} other channels"),
+        };
+        let more = if channels.len() > SHOWN { ", …" } else { "" };
+        Some(Finding::remark(&self.path, format_args!("skipped {count}: {shown}{more}")))
     }
 
     /// The touches by object, sorted by name; all are of the object `otherwise` if no message names one.
     ///
     /// # Errors
-    /// [`TouchesProblem::NamelessTouch`] if some name an object and others do not.
+    /// When some name an object and others do not.
     pub fn by_object(&self, otherwise: &str) -> Result<Vec<ObjectTouches>> {
         self.all_or_none_named()?;
         let mut objects: BTreeMap<&str, Vec<Touch>> = BTreeMap::new();
@@ -174,8 +155,7 @@ impl Log {
     /// called `object/placement`, those that name the object if none names the placement.
     ///
     /// # Errors
-    /// [`TouchesProblem::NamelessTouch`] as [`by_object`](Self::by_object), and [`TouchesProblem::NotInLog`] if there is
-    /// none.
+    /// Errors of [`by_object`](Self::by_object), and when there is none.
     pub fn of_object(&self, object: &str) -> Result<(Vec<Touch>, usize)> {
         self.all_or_none_named()?;
         let whole = object.split_once('/').map(|(whole, _)| whole);
@@ -186,8 +166,9 @@ impl Log {
         let is_it = |logged: &&Logged| self.object(logged).is_none_or(|name| name == named);
         let touches: Vec<Touch> = self.touches.iter().filter(is_it).map(|logged| logged.touch).collect();
         if touches.is_empty() {
-            let problem = TouchesProblem::NotInLog { object: object.into(), objects: self.objects.join(", ") };
-            return Err(Error::variant_at(Place::file(&self.path), problem));
+            return Err(problem!("no touch of {object} in this log, only of {}", self.objects.join(", "))
+                .fix("Give one of these names, or the log of the other object.")
+                .at(Place::file(&self.path)));
         }
         let others = self.touches.len() - touches.len();
         Ok((touches, others))
@@ -196,7 +177,9 @@ impl Log {
     fn all_or_none_named(&self) -> Result<()> {
         match self.touches.iter().find(|logged| logged.object.is_none()) {
             Some(nameless) if !self.objects.is_empty() => {
-                Err(Error::variant_at(Place::byte(&self.path, nameless.offset), TouchesProblem::NamelessTouch))
+                Err(problem!("this touch names no object, and others of the log do")
+                    .fix("Name the object in every message, or in none.")
+                    .at(Place::byte(&self.path, nameless.offset)))
             }
             _ => Ok(()),
         }

@@ -1,5 +1,6 @@
 //! Contents of a robot's log.
 
+use crate::error::{Error, problem};
 use palpate_shared::Touch;
 
 /// The channels of a log: topics, with the names of their schemas.
@@ -22,4 +23,10 @@ pub struct Message {
     pub touch: Touch,
     /// Its object, if that is known.
     pub object: Option<String>,
+}
+
+/// The problem with something in a log that exceeds a limit.
+pub(super) fn too_large(what: &str, bytes: u64, most: u64) -> Error {
+    problem!("{what} of {bytes} bytes, where at most {most} are read")
+        .fix("If it is meant, keep the touches alone: mcap filter LOG -o TOUCHES.mcap -y TOPIC.")
 }

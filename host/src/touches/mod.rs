@@ -31,11 +31,12 @@
 //! # }
 //! ```
 
+mod alike;
 pub mod check;
 mod checksum;
 mod dataset;
-pub(crate) mod error;
 mod files;
+mod finding;
 pub mod folds;
 mod listing;
 mod log;
@@ -53,14 +54,15 @@ mod save;
 mod seconds;
 mod surroundings;
 pub mod text;
-mod warning;
 
 pub(crate) use checksum::{CRC, checksum};
 pub use dataset::Dataset;
 pub(crate) use dataset::logs;
 pub(crate) use files::files;
+pub use files::{begins_log, is_log};
+pub use finding::Finding;
 pub use listing::{Entry, Listing, Lying};
-pub use log::{Log, Logged, begins_log, is_log, read_touches};
+pub use log::{Log, Logged, read_touches};
 pub use logged::{Channels, Message};
 pub use object::{ObjectTouches, Pool, Source};
 pub use origin::Origin;
@@ -69,4 +71,3 @@ pub use samples::Samples;
 pub use seconds::{Longest, located, touch_of_seconds};
 pub use surroundings::Surroundings;
 pub use text::{parse_touch, write_touch};
-pub use warning::Warning;

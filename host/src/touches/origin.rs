@@ -1,7 +1,7 @@
 //! Origin of touches.
 
 use super::{Longest, Samples, Surroundings};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, problem};
 use crate::mesh::{Instance, Object};
 use crate::probe::approach::{Aim, CLEARANCE, Probe};
 use crate::probe::noise::Noise;
@@ -144,12 +144,18 @@ impl Origin {
         }
     }
 
-    /// The longest side that an instance's bounding box is scaled to; none if it is to have its true size and that is not
-    /// known.
-    pub fn length_of(&self, object: &Object, instance: &Instance) -> Option<f64> {
+    /// The longest side that an instance's bounding box is scaled to.
+    ///
+    /// # Errors
+    /// When it is to have its true size, and that is not known.
+    pub fn length_of(&self, object: &Object, instance: &Instance) -> Result<f64> {
+        let unknown = || {
+            problem!("{}: the true size is unknown, because the mesh states no unit", object.name)
+                .fix("State the unit of the mesh: mm, cm, m or in.")
+        };
         match self.unit {
-            Length::Tenth => Some(self.length),
-            Length::Millimeter => object.true_length(instance),
+            Length::Tenth => Ok(self.length),
+            Length::Millimeter => object.true_length(instance).ok_or_else(unknown),
         }
     }
 

@@ -1,6 +1,6 @@
 //! Part of the samples of each object.
 
-use crate::error::TouchesProblem;
+use crate::error::{Error, Result, problem};
 use std::ops::Range;
 
 /// Samples of each object, from one up to another that does not belong to them: a part that one of several machines captures.
@@ -27,14 +27,15 @@ impl std::fmt::Display for Samples {
 }
 
 impl std::str::FromStr for Samples {
-    type Err = TouchesProblem;
+    type Err = Error;
 
     /// Reads `A..B`.
-    fn from_str(text: &str) -> Result<Self, TouchesProblem> {
+    fn from_str(text: &str) -> Result<Self> {
         let ends = text.split_once("..").and_then(|(first, end)| Some((first.parse().ok()?, end.parse().ok()?)));
         match ends {
             Some((first, end)) if first < end => Ok(Self { first, end }),
-            _ => Err(TouchesProblem::BadSamples { text: text.into() }),
+            _ => Err(problem!("{text:?} is not a range of samples")
+                .fix("Give A..B with A below B: 0..5000 are the first 5000.")),
         }
     }
 }
@@ -46,9 +47,9 @@ impl From<Samples> for String {
 }
 
 impl TryFrom<String> for Samples {
-    type Error = TouchesProblem;
+    type Error = Error;
 
-    fn try_from(text: String) -> Result<Self, TouchesProblem> {
+    fn try_from(text: String) -> Result<Self> {
         text.parse()
     }
 }
@@ -62,7 +63,8 @@ mod tests {
         assert_eq!("20..51".parse::<Samples>().unwrap(), Samples { first: 20, end: 51 });
         assert_eq!(Samples { first: 0, end: u64::MAX }.to_string().parse::<Samples>().unwrap().end, u64::MAX);
         for wrong in ["", "5..5", "6..5", "1", "..5", "1..", "-1..2", "a..b", "1..2..3", "1..=2"] {
-            assert_eq!(wrong.parse::<Samples>(), Err(TouchesProblem::BadSamples { text: wrong.into() }));
+            let error = wrong.parse::<Samples>().unwrap_err().to_string();
+            assert!(error.contains("is not a range of samples"), "{error}");
         }
     }
 }

@@ -1,8 +1,9 @@
 //! A data set in memory, to the disk.
 
 use super::{Dataset, Entry, Listing, Lying, ObjectTouches, Source, checksum, files, write_touch};
-use crate::error::{Error, Place, Result, TouchesProblem};
+use crate::error::{Error, Place, Result, problem};
 use crate::output;
+use crate::wording::first_ten;
 use std::path::Path;
 
 impl Dataset {
@@ -18,8 +19,8 @@ impl Dataset {
     /// not, such as for a part of a capture.
     ///
     /// # Errors
-    /// [`TouchesProblem::HoldsFiles`] if the directory holds touches; [`TouchesProblem::Unsaid`] if an object has several
-    /// instances or logs, and there would be no `dataset.json` to say so; when a file cannot be written.
+    /// When the directory holds touches; when an object has several instances or logs, and there would be no `dataset.json`
+    /// to say so, or has touches of robots that differ; when a file cannot be written.
     pub fn write(&self, directory: &Path, approaches: Option<&[u64]>) -> Result<()> {
         std::fs::create_dir_all(directory).map_err(|error| Error::io(directory, "make the directory", error))?;
         let there = files(directory)?;
@@ -28,19 +29,29 @@ impl Dataset {
             names.push(Listing::FILE.into());
         }
         if !names.is_empty() {
-            return Err(Error::variant_at(Place::file(directory), TouchesProblem::HoldsFiles { files: names }));
+            return Err(problem!("holds {}, and touches are not saved over others", first_ten(&names))
+                .fix("Give another directory, or move the files away.")
+                .at(Place::file(directory)));
         }
         let origin = &self.origin;
         let of_several = |object: &&ObjectTouches| object.sources().len() > 1;
         if let (None, Some(several)) = (origin, self.objects.iter().find(of_several)) {
-            let (name, sources) = (several.name.clone(), several.sources().len());
-            return Err(Error::variant_at(Place::file(directory), TouchesProblem::Unsaid { name, sources }));
+            let (name, sources) = (&several.name, several.sources().len());
+            return Err(problem!(
+                "{name} has {sources} instances or logs, and without a known probe no dataset.json states the source of each touch"
+            )
+            .fix(
+                "Say which probe made them (from Python `probe=`), or record each log with `palpate data record`.",
+            )
+            .at(Place::file(directory)));
         }
         if let Some(object) = self.objects.iter().find(|object| object.has_robots()) {
-            return Err(Error::variant_at(
-                Place::file(directory),
-                TouchesProblem::OfRobots { name: object.name.clone() },
-            ));
+            let name = &object.name;
+            return Err(problem!(
+                "the touches of {name} are of robots with different biases, and no file states the robot of each touch"
+            )
+            .fix("Write them without noise, and add it where they are read.")
+            .at(Place::file(directory)));
         }
         let poses = origin.as_ref().is_none_or(|origin| origin.pose) || self.is_recorded();
         let mut listing = Listing::new(&origin.clone().unwrap_or_default(), self.names());
@@ -207,15 +218,12 @@ mod tests {
     fn what_no_listing_could_say_is_not_written() {
         let [instances, _] = of_several(&Origin::default());
         let directory = tempfile::tempdir().unwrap();
-        let refused = |dataset: &Dataset| match dataset.write(directory.path(), None).unwrap_err().problem() {
-            Some(problem) => TouchesProblem::clone(problem),
-            other => panic!("{other:?}"),
-        };
+        let refused = |dataset: &Dataset| dataset.write(directory.path(), None).unwrap_err().to_string();
         let unknown = Dataset { origin: None, ..instances.clone() };
-        assert_eq!(refused(&unknown), TouchesProblem::Unsaid { name: "cup".into(), sources: 2 });
+        assert!(refused(&unknown).contains("cup has 2 instances or logs"), "{}", refused(&unknown));
         let mut robots = instances;
         robots.add_noise(&with!(Noise::default(), speed_bias = 0.1), 1, 3);
-        assert_eq!(refused(&robots), TouchesProblem::OfRobots { name: "cup".into() });
+        assert!(refused(&robots).contains("the touches of cup are of robots"), "{}", refused(&robots));
         assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 0);
     }
 
@@ -224,8 +232,7 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         std::fs::write(directory.path().join("spoon.txt"), "0 0 0\n").unwrap();
         let error = dataset(None).write(directory.path(), None).unwrap_err();
-        let holds = TouchesProblem::HoldsFiles { files: vec!["spoon.txt".into()] };
-        assert_eq!(error.problem::<TouchesProblem>(), Some(&holds));
+        assert!(error.to_string().contains("holds spoon.txt, and touches are not saved over others"), "{error}");
         assert!(!directory.path().join("cup.txt").exists());
     }
 }

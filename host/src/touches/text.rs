@@ -6,12 +6,12 @@
 //! 1970. A byte-order mark, a first line of names and lines that begin with # are skipped. The published data set has the same
 //! format.
 
+use super::alike::Alike;
 use super::checksum::Checked;
-use super::log::begins_bag;
-use super::seconds::{Longest, contact_times};
-use crate::error::{Error, Place, Result, TouchesProblem};
-use crate::probe::approach::to_q15;
-use palpate_shared::{Pose, Position, Q15_ONE, Touch};
+use super::files::refuse_bag;
+use super::seconds::{Longest, contact_times, position, unit_vector};
+use crate::error::{Error, Place, Result, problem};
+use palpate_shared::{Pose, Q15_ONE, Touch};
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{BufRead, BufReader};
@@ -36,11 +36,11 @@ impl<R: BufRead> Lines<R> {
     }
 
     /// The touch of a line; none of a blank one. The outer none: nothing is to be read in it.
-    fn touch(&mut self, bytes: &[u8]) -> Result<Option<Option<Touch>>, TouchesProblem> {
-        if self.line == 1 && begins_bag(bytes) {
-            return Err(TouchesProblem::Bag);
+    fn touch(&mut self, bytes: &[u8]) -> Result<Option<Option<Touch>>> {
+        if self.line == 1 {
+            refuse_bag(bytes)?;
         }
-        let text = std::str::from_utf8(bytes).map_err(|_| TouchesProblem::NotText)?;
+        let text = std::str::from_utf8(bytes).map_err(|_| problem!("not text (no UTF-8)").fix(CORRECT))?;
         let text = text.trim_start_matches('\u{feff}').trim();
         if text.is_empty() || text.starts_with('#') {
             return Ok(text.is_empty().then_some(None));
@@ -67,8 +67,7 @@ impl<R: BufRead> Iterator for Lines<R> {
                 Ok(0) => return None,
                 Ok(_) => {}
             }
-            let touch =
-                self.touch(&bytes).map_err(|problem| Error::variant_at(Place::line(&self.path, self.line), problem));
+            let touch = self.touch(&bytes).map_err(|error| error.at(Place::line(&self.path, self.line)));
             match touch.transpose() {
                 None => {}
                 Some(touch) => return Some(touch.map(|touch| (self.line, touch))),
@@ -93,8 +92,8 @@ pub(super) fn numbered(text: impl BufRead, path: &Path) -> impl Iterator<Item = 
             Ok((line, touch)) => (line, touch?),
             Err(error) => return Some(Err(error)),
         };
-        let admitted = alike.admit(touch).map_err(|problem| Error::variant_at(Place::line(path, line), problem));
-        Some(admitted.map(|touch| (line, touch)))
+        let admitted = alike.admit(&touch).map_err(|error| error.at(Place::line(path, line)));
+        Some(admitted.map(|()| (line, touch)))
     })
 }
 
@@ -112,9 +111,14 @@ pub(super) fn read_with_checksum(path: &Path, longest: &Longest) -> Result<(Vec<
     let mut text = BufReader::with_capacity(1 << 16, Checked::new(file));
     let touches = within(&mut text, path, longest)?;
     if touches.is_empty() {
-        return Err(Error::variant_at(Place::file(path), TouchesProblem::NoTouches));
+        return Err(no_touches().at(Place::file(path)));
     }
     Ok((touches, text.into_inner().checksum()))
+}
+
+/// The problem of a file without touches.
+pub(super) fn no_touches() -> Error {
+    problem!("no touches in it").fix("Capture the object again, or remove the file.")
 }
 
 /// All touches in a text, as [`touches`]. Where many of them take longer than `longest`, they are refused.
@@ -124,7 +128,7 @@ pub(super) fn read_with_checksum(path: &Path, longest: &Longest) -> Result<(Vec<
 pub fn within(text: impl BufRead, path: &Path, longest: &Longest) -> Result<Vec<Touch>> {
     let touches = numbered(text, path).collect::<Result<Vec<_>>>()?;
     let checked = longest.check_all(touches.iter().map(|(line, touch)| (*line, touch)));
-    checked.map_err(|(line, problem)| Error::variant_at(Place::line(path, line), problem))?;
+    checked.map_err(|(line, error)| error.at(Place::line(path, line)))?;
     Ok(touches.into_iter().map(|(_, touch)| touch).collect())
 }
 
@@ -134,7 +138,15 @@ pub fn within(text: impl BufRead, path: &Path, longest: &Longest) -> Result<Vec<
 ///
 /// # Errors
 /// Fault of the line.
-pub fn parse_touch(line: &str) -> Result<Touch, TouchesProblem> {
+pub fn parse_touch(line: &str) -> Result<Touch> {
+    touch(line).map_err(|error| error.fix(CORRECT))
+}
+
+/// Remedy for a wrong line.
+const CORRECT: &str = "Correct the line: three times in seconds, - for a missing contact, and optionally direction and \
+                       alignment, and behind them the position in millimeters.";
+
+fn touch(line: &str) -> Result<Touch> {
     let mut found = [""; 12];
     let mut count = 0;
     for field in fields(line) {
@@ -144,7 +156,9 @@ pub fn parse_touch(line: &str) -> Result<Touch, TouchesProblem> {
         count += 1;
     }
     if ![3, 9, 12].contains(&count) {
-        return Err(TouchesProblem::Fields { count });
+        return Err(problem!(
+            "{count} fields where a touch has three times, three times and six direction cosines, or these and three coordinates"
+        ));
     }
     let [a, b, c, pose @ ..] = found;
     let touch = Touch::new(contact_times([parse_time(a)?, parse_time(b)?, parse_time(c)?])?);
@@ -166,58 +180,18 @@ fn fields(line: &str) -> impl Iterator<Item = &str> {
     line.split(|c: char| c == ',' || c.is_whitespace()).filter(|field| !field.is_empty())
 }
 
-/// Touches that all have a position, or all have none.
-#[derive(Default)]
-pub(super) struct Alike {
-    /// True if those so far have one.
-    has_position: Option<bool>,
-}
-
-impl Alike {
-    /// The touch, if it is like those before.
-    pub(super) fn admit(&mut self, touch: Touch) -> Result<Touch, TouchesProblem> {
-        let has_position = touch.position().is_some();
-        match *self.has_position.get_or_insert(has_position) == has_position {
-            true => Ok(touch),
-            false => Err(TouchesProblem::OtherPosition { has_position, others: "the touches before it" }),
-        }
-    }
-}
-
-fn parse_time(field: &str) -> Result<Option<f64>, TouchesProblem> {
+fn parse_time(field: &str) -> Result<Option<f64>> {
     if field == "-" { Ok(None) } else { parse_number(field).map(Some) }
 }
 
-fn parse_unit(name: &'static str, fields: [&str; 3]) -> Result<[i16; 3], TouchesProblem> {
+fn parse_unit(name: &str, fields: [&str; 3]) -> Result<[i16; 3]> {
     let [x, y, z] = fields;
     unit_vector(name, [parse_number(x)?, parse_number(y)?, parse_number(z)?])
 }
 
-/// A unit vector in Q15. Vectors that are not finite, or whose length is off by more than 1 %, are refused.
-pub(super) fn unit_vector(name: &'static str, vector: [f64; 3]) -> Result<[i16; 3], TouchesProblem> {
-    let length = vector.iter().map(|cosine| cosine * cosine).sum::<f64>().sqrt();
-    if (length - 1.0).abs() <= 0.01 {
-        return Ok(vector.map(to_q15));
-    }
-    Err(TouchesProblem::NotUnit { vector: name, length })
-}
-
-/// A position from millimeters, rounded to whole micrometers.
-pub(super) fn position(millimeters: [f64; 3]) -> Result<Position, TouchesProblem> {
-    let mut micrometers = [0; 3];
-    for (whole, millimeters) in micrometers.iter_mut().zip(millimeters) {
-        let rounded = (1e3 * millimeters).round();
-        if !(f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&rounded) {
-            return Err(TouchesProblem::FarPosition { millimeters });
-        }
-        *whole = rounded as i32;
-    }
-    Ok(Position { micrometers })
-}
-
-fn parse_number(field: &str) -> Result<f64, TouchesProblem> {
-    let number: f64 = field.parse().map_err(|_| TouchesProblem::NotANumber { text: field.into() })?;
-    if number.is_finite() { Ok(number) } else { Err(TouchesProblem::NotFinite { text: field.into() }) }
+fn parse_number(field: &str) -> Result<f64> {
+    let number: f64 = field.parse().map_err(|_| problem!("{field:?} is not a number"))?;
+    if number.is_finite() { Ok(number) } else { Err(problem!("{field} is not finite")) }
 }
 
 /// Appends the line of a touch with its line end: times with six decimals, and with `pose` the direction and alignment
@@ -247,6 +221,8 @@ pub fn write_touch(line: &mut String, touch: &Touch, pose: bool) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::probe::approach::to_q15;
+    use palpate_shared::Position;
 
     fn written(touch: &Touch, pose: bool) -> String {
         let mut line = String::new();

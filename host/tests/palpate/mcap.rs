@@ -5,7 +5,7 @@ mod files;
 
 use files::{channel, chunk, file, message, python, record, schema, touches};
 use palpate::chip::{Step, Steps};
-use palpate::error::{Error, Place, TouchesProblem, Variant};
+use palpate::error::{Error, Place};
 use palpate::shared::Touch;
 use palpate::touches::check::Check;
 use palpate::touches::mcap::TOUCH;
@@ -20,14 +20,6 @@ fn read(bytes: &[u8]) -> Result<Log, Error> {
 #[track_caller]
 fn error(bytes: &[u8]) -> String {
     read(bytes).map(|log| log.touches().len()).unwrap_err().to_string()
-}
-
-/// The problem with these bytes, and its place.
-#[track_caller]
-fn problem(bytes: &[u8]) -> (TouchesProblem, Place) {
-    let error = read(bytes).map(|log| log.touches().len()).unwrap_err();
-    let problem = error.problem::<TouchesProblem>().unwrap_or_else(|| panic!("{error}")).clone();
-    (problem, error.place().clone())
 }
 
 /// The touches that make.py wrote, with and without their poses.
@@ -237,11 +229,11 @@ fn record_head(text: &str) -> Vec<u8> {
 fn a_log_without_touches_says_which_channels_there_are() {
     let tf =
         [schema(1, "tf2_msgs/msg/TFMessage", "ros2msg", ""), channel(1, 1, "/tf", "cdr"), channel(2, 0, "/raw", "")];
-    let (problem, place) = problem(&file(&tf));
-    assert_eq!(place, Place::file("robot.mcap"));
-    let said = problem.to_string();
-    assert_eq!(said, "no channel of touches in this log: it has /tf (tf2_msgs/msg/TFMessage), /raw (no schema)");
-    assert!(problem.fix().contains("palpate_msgs/msg/Touch"));
+    let refused = read(&file(&tf)).unwrap_err();
+    assert_eq!(refused.place(), &Place::file("robot.mcap"));
+    let what = "no channel of touches in this log: it has /tf (tf2_msgs/msg/TFMessage), /raw (no schema)";
+    assert_eq!(refused.what(), what);
+    assert!(refused.remedy().contains("palpate_msgs/msg/Touch"));
     assert!(error(&file(&[])).contains("it has no channel at all"));
     assert!(error(&touches(&[])).contains("robot.mcap: no touches in it"));
 }

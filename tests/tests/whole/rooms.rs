@@ -39,7 +39,7 @@ fn room(file: &Path, source: &Path) -> String {
 }
 
 /// First names of the paths that start with `crate::` in code, inline tests and comments left out, and the rooms that
-/// problems belong to, `touches` for `TouchesProblem`, since all problems are gathered in one module.
+/// problems belong to, `locate` for `LocateProblem`, since all problems are gathered in one module.
 fn used(text: &str) -> BTreeSet<String> {
     let is_name = |c: char| c.is_alphanumeric() || c == '_';
     let code = text.split("\nmod tests {").next().unwrap_or_default();

@@ -4,7 +4,7 @@ use super::progress::{Bar, cancel_when_interrupted};
 use super::scene::{SceneArguments, described};
 use super::{Global, remark};
 use palpate::capture::{self, Settings, Summary};
-use palpate::error::{CaptureProblem, TouchesProblem, Variant};
+use palpate::error::Kind;
 use palpate::mesh::BACKGROUND;
 use palpate::mesh::facts::Facts;
 use palpate::output;
@@ -174,28 +174,25 @@ pub(super) fn aim(name: &str) -> Result<Aim, String> {
 }
 
 /// An option's value; what is wrong with it, with what to do.
-fn parsed<T: std::str::FromStr<Err = TouchesProblem>>(text: &str) -> Result<T, String> {
-    text.parse().map_err(|problem: TouchesProblem| format!("{problem}. {}", problem.fix()))
+fn parsed<T: std::str::FromStr<Err = Error>>(text: &str) -> Result<T, String> {
+    text.parse().map_err(|error: Error| error.to_string())
 }
 
 /// Options that help where a capture is refused, of those that the command has.
 pub(super) fn hint(error: &Error, has: &dyn Fn(&str) -> bool) -> Option<String> {
-    let said = match error.problem::<CaptureProblem>()? {
-        CaptureProblem::HoldsOthers { .. } => "--force replaces the data set that is there; other files stay.",
-        CaptureProblem::Untouchable { is_true_size, .. } => {
-            let size = if *is_true_size { "--true-size" } else { "--length" };
+    match *error.kind() {
+        Kind::Exists => Some("--force replaces the data set that is there; other files stay.".into()),
+        Kind::Untouchable { is_true_size, .. } => {
+            let size = if is_true_size { "--true-size" } else { "--length" };
             let options = [
                 (has("approaches") && has("samples")).then_some("--approaches N keeps every approach."),
                 has("skip-bad").then_some("--skip-bad leaves such objects out."),
             ];
             let options: String = options.into_iter().flatten().map(|option| format!("{option} ")).collect();
-            return Some(format!("{options}See also --probe and {size}."));
+            Some(format!("{options}See also --probe and {size}."))
         }
-        CaptureProblem::Threads { .. } => "See --threads.",
-        CaptureProblem::NoTrueSize { .. } => "See --true-size.",
-        _ => return None,
-    };
-    Some(said.into())
+        _ => None,
+    }
 }
 
 /// Counts of a capture that keeps every approach: none of them has to be a touch.

@@ -9,8 +9,8 @@ use super::sequences::{self, Evaluation, SequenceArguments};
 use super::table::{self, TableArguments};
 use palpate::calibrate::{Per, Terms};
 use palpate::ensemble::OverTouches;
-use palpate::error::EvaluateProblem;
 use palpate::evaluate::model_file::ModelFile;
+use palpate::evaluate::over_touches;
 use palpate::evaluate::{self, Classes, Evaluated, Regression, RowsEvaluation, Wanted, evaluate_rows};
 use palpate::output;
 use palpate::probe::noise::Noise;
@@ -185,7 +185,7 @@ fn sequences_of(
 /// Evaluates a model on labeled rows.
 fn rows(directory: &Path, arguments: &Arguments, file: &ModelFile, label: &str, global: &Global) -> Result<()> {
     if file.with(|candidate| Ok(!candidate.is_of_rows()))? {
-        return Err(Error::from(EvaluateProblem::OverTouches).in_file(&arguments.model));
+        return Err(over_touches().in_file(&arguments.model));
     }
     let features = match file {
         ModelFile::Full(ensemble) => Features::from(&**ensemble),

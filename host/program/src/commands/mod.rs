@@ -45,8 +45,8 @@ mod view;
 
 use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use palpate::error::{CaptureProblem, EvaluateProblem, Kind, Place};
-use palpate::touches::{Dataset, Listing, Log, Warning};
+use palpate::error::{Kind, Place, problem};
+use palpate::touches::{Dataset, Finding, Listing, Log};
 use palpate::{Error, Result, output};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -165,7 +165,9 @@ impl Global {
         // More are of no use, and cost memory.
         let Some(asked) = self.threads.map(|asked| asked.min(MOST_THREADS)) else { return Ok(()) };
         let built = rayon::ThreadPoolBuilder::new().num_threads(asked).build_global();
-        built.map_err(|error| CaptureProblem::Threads { asked, started: 0, message: error.to_string() }.into())
+        built.map_err(|error| {
+            problem!("the system started only 0 of {asked} threads ({error})").fix("Use fewer threads. See --threads.")
+        })
     }
 }
 
@@ -433,7 +435,13 @@ fn is_located(dataset: &Dataset) -> bool {
 
 /// Refuses touches with a position, for a model of trees.
 fn refuse_located(dataset: &Dataset, directory: &Path) -> Result<()> {
-    if is_located(dataset) { Err(Error::variant_at(Place::file(directory), EvaluateProblem::Located)) } else { Ok(()) }
+    if is_located(dataset) { Err(located().at(Place::file(directory))) } else { Ok(()) }
+}
+
+/// The problem of touches with a position for a model of trees.
+fn located() -> Error {
+    problem!("touches with a position, which a model of trees does not use")
+        .fix("Train maps on touches with a position (`palpate train`), or leave positions out.")
 }
 
 /// A data set whose warnings went to stderr.
@@ -443,10 +451,10 @@ fn checked(dataset: Dataset) -> Dataset {
 }
 
 /// Says to stderr what looks wrong, or what was skipped.
-fn say(warning: &Warning) {
-    match warning {
-        Warning::SkippedChannels { .. } => remark(&format!("palpate: {warning}")),
-        _ => remark(&format!("palpate: warning: {warning}")),
+fn say(finding: &Finding) {
+    match finding.fix.is_empty() {
+        true => remark(&format!("palpate: {finding}")),
+        false => remark(&format!("palpate: warning: {finding}")),
     }
 }
 

@@ -5,7 +5,7 @@ use super::real::only_captured;
 use super::remark;
 use palpate::capture;
 use palpate::ensemble::StatedProbe;
-use palpate::error::CaptureProblem;
+use palpate::error::{Kind, problem};
 use palpate::mesh::facts::sides;
 use palpate::mesh::source::{self, Search};
 use palpate::mesh::{BACKGROUND, Object, builtin};
@@ -221,7 +221,8 @@ impl UnitArguments {
         let unknown = objects.iter().filter(|object| object.millimeters.is_none()).map(|object| object.name.as_str());
         match unknown.collect::<Vec<_>>().join(", ") {
             name if name.is_empty() => Ok(()),
-            name => Err(CaptureProblem::NoTrueSize { name }.into()),
+            names => Err(problem!("{names}: the true size is unknown, because the mesh states no unit")
+                .fix("State the unit of the mesh: mm, cm, m or in. See --true-size.")),
         }
     }
 
@@ -279,13 +280,13 @@ impl SizeArguments {
         if !self.units.skip_bad {
             return Ok(objects);
         }
-        let Some(problem) = capture::untouchable(&objects, origin, &())? else { return Ok(objects) };
-        let CaptureProblem::Untouchable { objects: bad, .. } = &problem else { return Err(problem.into()) };
-        let is_bad = |object: &Object| bad.iter().any(|bad| bad.name == object.name);
+        let Some(error) = capture::untouchable(&objects, origin, &())? else { return Ok(objects) };
+        let Kind::Untouchable { objects: bad, .. } = error.kind() else { return Err(error) };
+        let is_bad = |object: &Object| bad.contains(&object.name);
         if objects.iter().all(is_bad) {
-            return Err(problem.into());
+            return Err(error);
         }
-        remark(&format!("palpate: left out: {problem}"));
+        remark(&format!("palpate: left out: {}", error.what()));
         Ok(objects.into_iter().filter(|object| !is_bad(object)).collect())
     }
 

@@ -7,7 +7,8 @@ use super::recognize_rows::{reset, verdict_name};
 use palpate::Result;
 use palpate::chip::Entry;
 use palpate::compile::{self, CompiledModel};
-use palpate::error::{Error, EvaluateProblem, Place};
+use palpate::error::{Error, Place};
+use palpate::evaluate::{no_plan, raw_features, too_many_objects};
 use palpate::locate::MapsFile;
 use palpate::touches::Longest;
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
@@ -110,11 +111,8 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let stopping = compile::stopping(arguments.error_rate.unwrap_or(own.error_rate()), max_touches)?;
     // The model's own threshold stays as it is, to the last bit.
     let stopping = if arguments.error_rate.is_none() { own.with_max_touches(max_touches) } else { stopping };
-    let too_many = |error: palpate_onboard::CapacityError| {
-        let problem = EvaluateProblem::TooManyObjects { objects: error.objects, capacity: error.capacity };
-        Error::variant_at(Place::file(&arguments.model), problem)
-    };
-    let recognizer = Recognizer::<256>::new(&model, stopping).map_err(too_many)?;
+    let of_model = |error: Error| error.at(Place::file(&arguments.model));
+    let recognizer = Recognizer::<256>::new(&model, stopping).map_err(|error| of_model(too_many_objects(error)))?;
     let weights = arguments.expected.weights(&compiled.names(), &palpate::evaluate::own_weights(&model))?;
     if arguments.features {
         if arguments.expected.is_given() && !arguments.add_up {
@@ -126,7 +124,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
             .map_err(|error| error.in_file(&arguments.model));
     }
     if model.descriptor().is_none() {
-        return Err(Error::variant_at(Place::file(&arguments.model), EvaluateProblem::RawFeatures));
+        return Err(of_model(raw_features()));
     }
     if arguments.next {
         let allowed =
@@ -134,7 +132,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         return Err(Error::setting("next", "given", allowed));
     }
     if arguments.active && model.plan().is_none() {
-        return Err(Error::variant_at(Place::file(&arguments.model), EvaluateProblem::NoPlan));
+        return Err(of_model(no_plan()));
     }
     let longest = compile::longest(&model);
     let (active, json) = (arguments.active, global.json);
@@ -169,9 +167,9 @@ impl<'m> Stream<'m> {
             Event::Begin => self.reset(),
             Event::Touch { touch, place } => {
                 if touch.position().is_some() {
-                    return Err(Error::variant_at(place, EvaluateProblem::Located));
+                    return Err(super::located().at(place));
                 }
-                self.longest.check(touch).map_err(|problem| Error::variant_at(place, problem))?;
+                self.longest.check(touch).map_err(|error| error.at(place))?;
                 self.push(touch)?;
             }
         }

@@ -2,7 +2,7 @@
 
 use super::rows::read_rows;
 use palpate::Result;
-use palpate::error::EvaluateProblem;
+use palpate::evaluate::over_touches;
 use palpate::evaluate::verify::margins;
 use palpate::output;
 use palpate::rows::{Encoder, Features, RowOf, SequencesBuilder};
@@ -78,7 +78,7 @@ pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, asked: &Asked<'_
     let mut recognizer = recognizer;
     let model = *recognizer.model();
     if model.descriptor().is_some() {
-        return Err(EvaluateProblem::OverTouches.into());
+        return Err(over_touches());
     }
     let path = if path.as_os_str() == "-" { Path::new("/dev/stdin") } else { path };
     let features = if adds_up { Features::measured(&model) } else { Features::from(&model) };

@@ -1,6 +1,6 @@
 //! Options and output of `palpate train` for recorded touches.
 
-use palpate::error::{Error, Place, Result, TouchesProblem};
+use palpate::error::{Error, Place, Result, problem};
 use palpate::probe::file::ProbeFile;
 use palpate::teach::{Taught, TaughtObject};
 use palpate::touches::{Dataset, ObjectTouches, Origin, is_log};
@@ -81,7 +81,9 @@ fn add(all: &mut Dataset, mut read: Dataset, path: &Path) -> Result<()> {
         }
     }
     if let Some(twice) = read.objects.iter().find(|object| all.objects.iter().any(|other| other.name == object.name)) {
-        return Err(Error::variant_at(Place::file(path), TouchesProblem::RecordedTwice { name: twice.name.clone() }));
+        return Err(problem!("the object {} was given twice", twice.name)
+            .fix("Put its touches into one file.")
+            .at(Place::file(path)));
     }
     if let (Some(one), Some(other)) = (&all.origin, &read.origin) {
         let stated = [one, other].map(|origin| palpate::ensemble::StatedProbe::from(origin).trained());

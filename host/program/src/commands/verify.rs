@@ -4,7 +4,8 @@ use super::unstated::UnstatedArguments;
 use palpate::Result;
 use palpate::compile::CompiledModel;
 use palpate::ensemble::{self, OverTouches};
-use palpate::error::{Error, EvaluateProblem, Kind, Place};
+use palpate::error::{Error, Kind, Place};
+use palpate::evaluate::over_touches;
 use palpate::evaluate::verify::{Library, Verified, verify};
 use palpate::rows::{read_margins, read_values};
 use palpate::wording::{count, scientific};
@@ -67,7 +68,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         }
         // A log is a data set, too.
         if data.is_file() && !palpate::touches::is_log(data) {
-            return Err(Error::variant_at(Place::file(&arguments.ensemble), EvaluateProblem::OverTouches));
+            return Err(over_touches().at(Place::file(&arguments.ensemble)));
         }
         let data = (data.as_path(), arguments.sequences);
         return super::parity::run((&arguments.model, &compiled), &ensemble, data, global);

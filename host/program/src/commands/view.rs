@@ -10,7 +10,6 @@ use super::shell;
 use clap::ArgGroup;
 use glam::DVec3;
 use palpate::compile::CompiledModel;
-use palpate::error::CaptureProblem;
 use palpate::output;
 use palpate::touches::{Origin, Surroundings};
 use palpate::{Error, Result};
@@ -104,8 +103,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let mut object = [size.object(source)?];
     arguments.scene.weigh(&mut object)?;
     let [object] = object;
-    let unknown = || CaptureProblem::NoTrueSize { name: object.name.clone() };
-    let length = object.instances().next().and_then(|first| origin.length_of(&object, first)).ok_or_else(unknown)?;
+    let length = object.instances().next().map_or(Ok(0.0), |first| origin.length_of(&object, first))?;
     let probe = origin.probe;
     let clearance = origin.clearance([DVec3::ZERO, DVec3::splat(length)]);
     let touches = touches.map_or(view::Settings::default().touches, |touches| touches as usize);

@@ -18,7 +18,8 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, html};
 use palpate::compile::CompiledModel;
-use palpate::error::{CaptureProblem, EvaluateProblem, Result};
+use palpate::error::Result;
+use palpate::evaluate::raw_features;
 use palpate::mesh::Object;
 use palpate::play::compress;
 use palpate::probe::approach::Aim;
@@ -59,7 +60,7 @@ impl Contender {
     /// A model by a name that says which touches are evidence to it, and what it makes of them.
     ///
     /// # Errors
-    /// [`EvaluateProblem::RawFeatures`] for a model over rows of features.
+    /// When the model is over rows of features.
     pub fn new(model: CompiledModel) -> Result<Self> {
         let name = about(&model.model())?;
         Ok(Self { name, model })
@@ -97,7 +98,7 @@ pub fn distinguish(contenders: &mut [Contender], files: &[PathBuf]) {
 
 /// A model's features and touches, in words.
 fn about(model: &Model<'_>) -> Result<String> {
-    let descriptor = model.descriptor().ok_or(EvaluateProblem::RawFeatures)?;
+    let descriptor = model.descriptor().ok_or_else(raw_features)?;
     let touches = match model.trained_touches().counted {
         Counted::Full => "full touches",
         Counted::Contacts => "every contact",
@@ -110,7 +111,7 @@ fn about(model: &Model<'_>) -> Result<String> {
 /// simplified, which the page says. The same objects, models and settings give the same page.
 ///
 /// # Errors
-/// Errors of [`surfaces()`]; [`CaptureProblem`] for an object whose true size is not known.
+/// Errors of [`surfaces()`].
 pub fn page(objects: &[Object], contenders: &[Contender], settings: &Settings) -> Result<String> {
     let surfaces = surfaces(objects, &settings.origin)?;
     let json = data(&surfaces, contenders, settings)?;
@@ -369,9 +370,7 @@ fn notes(surfaces: &[Surface], contenders: &[Contender], settings: &Settings) ->
 
 /// The longest side of an object's first mesh, in units.
 fn length(object: &Object, origin: &Origin) -> Result<f64> {
-    let unknown = || CaptureProblem::NoTrueSize { name: object.name.clone() };
-    let first = object.instances().next().and_then(|first| origin.length_of(object, first));
-    Ok(first.ok_or_else(unknown)?)
+    object.instances().next().map_or(Ok(0.0), |first| origin.length_of(object, first))
 }
 
 #[cfg(test)]

@@ -42,7 +42,7 @@ impl Surface {
 /// them would take more than 1.3 MB, the largest are simplified until they do not.
 ///
 /// # Errors
-/// [`CaptureProblem::NoTrueSize`](palpate::error::CaptureProblem::NoTrueSize).
+/// When an object is to have its true size, and that is not known.
 pub fn surfaces(objects: &[Object], origin: &Origin) -> Result<Vec<Surface>> {
     let mut most = MOST_TRIANGLES;
     loop {

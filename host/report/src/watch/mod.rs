@@ -11,7 +11,8 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, html};
 use palpate::compile::CompiledModel;
-use palpate::error::{EvaluateProblem, Result};
+use palpate::error::Result;
+use palpate::evaluate::raw_features;
 use palpate_onboard::Stopping;
 
 /// The host's end of the link, compiled to WebAssembly.
@@ -21,10 +22,10 @@ pub(crate) const WASM: &[u8] = include_bytes!("../../assets/play/link.wasm");
 /// arguments give the same page.
 ///
 /// # Errors
-/// [`EvaluateProblem::RawFeatures`] for a model over rows of features.
+/// When the model is over rows of features.
 pub fn page(model: Option<&CompiledModel>, command: &str) -> Result<String> {
     if model.is_some_and(|model| model.model().descriptor().is_none()) {
-        return Err(EvaluateProblem::RawFeatures.into());
+        return Err(raw_features());
     }
     let data = serde_json::json!({ "wasm": STANDARD.encode(WASM), "model": model.map(stated) });
     let text = serde_json::to_string(&data).map_err(|error| PageProblem::Scene { reason: error.to_string() })?;

@@ -11,7 +11,7 @@
 use crate::ensemble::{
     Ensemble, MAX_OBJECTS, Node, Provenance, StatedProbe, TouchOrigin, Trained, check_names, feature_row, inputs,
 };
-use crate::error::{Error, Kind, Result, TrainProblem};
+use crate::error::{Error, Kind, Result, problem};
 use crate::mesh::BACKGROUND;
 use crate::probe::noise::Noise;
 use crate::progress::Progress;
@@ -22,9 +22,9 @@ use palpate_trees::train as boost;
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::ops::ControlFlow;
 
-pub(crate) mod error;
 #[cfg(feature = "xgboost")]
 mod xgboost;
 
@@ -174,8 +174,7 @@ impl Settings {
 /// of threads. Progress is counted in rounds.
 ///
 /// # Errors
-/// [`Kind::Setting`](crate::error::Kind::Setting) if a setting is out of its range; [`TrainProblem`] if there are
-/// fewer than two objects or more than 256, a name that no file can hold, an object without touches, or the descriptor
+/// [`Kind::Setting`](crate::error::Kind::Setting) if a setting is out of its range; if there are fewer than two objects or more than 256, a name that no file can hold, an object without touches, or the descriptor
 /// needs a pose that no touch has. All of it is found before the training starts. [`Kind::Cancelled`](crate::error::Kind::Cancelled).
 pub fn train(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) -> Result<Ensemble> {
     let shares = dataset.placement_shares();
@@ -231,7 +230,8 @@ fn origin(dataset: &Dataset, settings: &Settings, evidence: &Evidence<'_>) -> Pr
 /// objects that the ensemble does not know, and is called [`BACKGROUND`].
 ///
 /// # Errors
-/// Errors of [`train`]; data sets that were captured with different probes; [`TrainProblem::Background`] if only one of them holds approaches, or an object has the
+/// Errors of [`train`]; data sets that were captured with different probes; if only one of them holds approaches, or an object
+/// has the
 /// background's name.
 pub fn train_with_background(
     dataset: &Dataset,
@@ -243,12 +243,10 @@ pub fn train_with_background(
         StatedProbe::compare(["the data set", "the background"], [own.trained(), other.trained()])?;
     }
     if dataset.holds_approaches() != background.holds_approaches() {
-        let detail = "one of the data sets holds approaches and the other full touches only";
-        return Err(TrainProblem::Background { detail }.into());
+        return Err(other_background("one of the data sets holds approaches and the other full touches only"));
     }
     if dataset.objects.iter().any(|object| object.name == BACKGROUND) {
-        let detail = "an object of the data set is called background";
-        return Err(TrainProblem::Background { detail }.into());
+        return Err(other_background("an object of the data set is called background"));
     }
     let mut both = dataset.clone();
     both.objects.push(ObjectTouches::joined(BACKGROUND, &background.objects));
@@ -314,7 +312,7 @@ fn with_palpate(
     let trained = boost::train(rows.lent(), objects.len(), parameters, settings.threads, &on_round);
     let (base_margins, trees) = trained.map_err(|error| match error.kind() {
         Kind::Cancelled => error,
-        _ => TrainProblem::Trainer { trainer: "palpate", detail: error.to_string() }.into(),
+        _ => trainer_refused("palpate", &error),
     })?;
     Ok(Ensemble { inputs: inputs(settings.descriptor), objects, base_margins, trees, origin: Provenance::default() })
 }
@@ -342,19 +340,48 @@ fn with_xgboost(_: &Rows, _: &Settings, _: Vec<String>, _: &dyn Progress) -> Res
 fn check(dataset: &Dataset, descriptor: Descriptor) -> Result<()> {
     let objects = &dataset.objects;
     match objects.len() {
-        0 | 1 => return Err(TrainProblem::OneObject.into()),
+        0 | 1 => return Err(problem!("there is only one object to train on").fix("Capture at least two.")),
         2..=MAX_OBJECTS => {}
-        objects => return Err(TrainProblem::TooManyObjects { objects }.into()),
+        objects => return Err(too_many_objects(objects)),
     }
     check_names(&dataset.names())?;
     if let Some(empty) = objects.iter().find(|object| object.is_empty()) {
-        return Err(TrainProblem::NoTouches { object: empty.name.clone() }.into());
+        return Err(problem!("{} has no touches to train on", empty.name).fix("Capture it again."));
     }
     let posed = || objects.iter().flat_map(ObjectTouches::touches).any(|touch| touch.pose().is_some());
     if descriptor.needs_pose() && !posed() {
-        return Err(TrainProblem::NoPose { descriptor }.into());
+        return Err(problem!("the descriptor {} needs the probe's pose, which no touch has", descriptor.name())
+            .fix("Capture the touches with their pose, or use the descriptor curvature."));
     }
     Ok(())
+}
+
+/// The problem of more objects than a model can hold.
+pub(crate) fn too_many_objects(objects: usize) -> Error {
+    problem!("there are {objects} objects to train on, more than the {MAX_OBJECTS} that a model can distinguish")
+        .fix("Leave some objects out of the data set.")
+}
+
+/// The problem of a background that does not go with a data set.
+fn other_background(why: &str) -> Error {
+    problem!("the background does not match the data set: {why}")
+        .fix("Capture the background as the data set: `palpate capture background`.")
+}
+
+/// The problem of a trainer that refused what it was given, or failed.
+fn trainer_refused(trainer: &str, refusal: &impl Display) -> Error {
+    problem!("the trainer {trainer} refused the touches: {refusal}").fix("Report this as a bug, with the data.")
+}
+
+/// The problem of an object without touches of those that were to be evidence.
+fn no_evidence(object: &str, counted: Counted) -> Error {
+    let none = match counted {
+        Counted::Full => "none has three contacts",
+        Counted::Contacts => "none has a contact",
+        Counted::All => "none has what the descriptor needs",
+    };
+    problem!("no touch of {object} is evidence: {none}")
+        .fix("Capture more approaches, or train on touches with any contact.")
 }
 
 /// The trainer's parameters.
@@ -406,7 +433,7 @@ impl<'d> Evidence<'d> {
     /// The touches that [`Settings::counted`] names, and that have a pose if the descriptor needs one.
     ///
     /// # Errors
-    /// [`TrainProblem::NothingCounts`] if an object has none.
+    /// When an object has none.
     fn new(dataset: &'d Dataset, settings: &Settings) -> Result<Self> {
         let counted = settings.counted.unwrap_or(Counted::Full);
         let needs_pose = settings.descriptor.needs_pose();
@@ -424,7 +451,7 @@ impl<'d> Evidence<'d> {
                 touches.to_mut().retain(counts);
             }
             match touches.len() {
-                0 => Err(TrainProblem::NothingCounts { object: object.name.clone(), counted }.into()),
+                0 => Err(no_evidence(&object.name, counted)),
                 _ => Ok(touches),
             }
         });

@@ -1,8 +1,8 @@
 //! XGBoost itself as the trainer: version 1.6.2, built from source behind the cargo feature `xgboost`.
 
-use super::{BASE_MARGIN, Rows, Settings};
+use super::{BASE_MARGIN, Rows, Settings, trainer_refused};
 use crate::ensemble::{Ensemble, schema};
-use crate::error::{Error, Result, TrainProblem};
+use crate::error::Result;
 use crate::progress::{self, Progress};
 use std::collections::HashMap;
 use xgboost_rs::{Booster, DMatrix, XGBError};
@@ -14,8 +14,7 @@ pub(super) fn train(
     objects: Vec<String>,
     progress: &dyn Progress,
 ) -> Result<Ensemble> {
-    let failed =
-        |error: XGBError| -> Error { TrainProblem::Trainer { trainer: "XGBoost", detail: error.to_string() }.into() };
+    let failed = |error: XGBError| trainer_refused("XGBoost", &error);
     let data = matrix(rows, settings).map_err(failed)?;
     let mut booster = Booster::new_with_json_config(&[&data], parameters(settings, objects.len())).map_err(failed)?;
     progress.begin("training", u64::try_from(settings.rounds).ok());

@@ -1,7 +1,8 @@
 //! Approaches where the model's plan says.
 
 use super::poses::{ByPose, Stock};
-use crate::error::{EvaluateProblem, Result};
+use super::{check_approaches, no_plan};
+use crate::error::Result;
 use crate::evaluate::Candidate;
 use crate::evaluate::margins::{Margins, Tested, Values, row};
 use crate::evidence::{Chip, Counted, Follower, Outcome, Supplier, chip, follow, outcome};
@@ -43,17 +44,14 @@ impl Active {
     /// The approaches of a data set, which the margins are of, by the poses of the model's plan.
     ///
     /// # Errors
-    /// [`EvaluateProblem::NoPlan`] for a model without one, or an ensemble; [`EvaluateProblem::NoApproaches`] and
-    /// [`EvaluateProblem::NoPoseOf`] for a data set without approaches or without poses.
+    /// When there is no plan, such as in an ensemble; when the data set is without approaches or without poses.
     pub(crate) fn new(margins: &Margins<'_>, dataset: &Dataset) -> Result<Self> {
         let plan = match margins.candidate {
             Candidate::Full(_) => None,
             Candidate::Compiled(model) => model.plan(),
         };
-        let plan = plan.ok_or(EvaluateProblem::NoPlan)?;
-        if !dataset.holds_approaches() {
-            return Err(EvaluateProblem::NoApproaches.into());
-        }
+        let plan = plan.ok_or_else(no_plan)?;
+        check_approaches(dataset)?;
         let poses = plan.poses();
         let turns = |(tested, object): (&Tested<'_>, &ObjectTouches)| -> Result<Vec<ByPose>> {
             tested.pools.iter().map(|pool| ByPose::new(object, poses, &pool.touches)).collect()

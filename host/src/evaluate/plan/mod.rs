@@ -8,11 +8,12 @@ pub(super) use active::Active;
 pub use active::ActiveFacts;
 pub(super) use figures::evaluate_active;
 use poses::ByPose;
+pub(crate) use poses::no_pose_of;
 
 use super::Candidate;
 use super::margins::{Margins, Values, row};
 use crate::compile::{self, Restated, restate};
-use crate::error::{Error, EvaluateProblem, Result};
+use crate::error::{Error, Result, problem};
 use crate::touches::Dataset;
 use palpate_onboard::Model;
 use palpate_shared::format::{Plan, Tag};
@@ -61,8 +62,8 @@ pub struct Hardest {
 /// the model counts as evidence of 0.
 ///
 /// # Errors
-/// [`Kind::Setting`](crate::error::Kind::Setting) `rolls`; as [`Margins::new`]; [`EvaluateProblem`] if the model has
-/// fewer than two objects, if the data set has no approaches, none of one of the objects, none with a pose, or too few in
+/// [`Kind::Setting`](crate::error::Kind::Setting) `rolls`; as [`Margins::new`]; if the model has fewer
+/// than two objects, if the data set has no approaches, none of one of the objects, none with a pose, or too few in
 /// a pose.
 pub fn plan(model: &Model<'_>, dataset: &Dataset, rolls: u8) -> Result<Planned> {
     let poses = Poses::with_rolls(rolls).ok_or_else(|| Error::setting("rolls", rolls, "1, 2 or 4"))?;
@@ -71,18 +72,20 @@ pub fn plan(model: &Model<'_>, dataset: &Dataset, rolls: u8) -> Result<Planned> 
         return Err(Error::setting("plan", "given", allowed));
     }
     if model.known_count() < 2 {
-        return Err(EvaluateProblem::OneObjectToPlan.into());
+        return Err(problem!("the model has one object: there is nothing to distinguish it from")
+            .fix("Train a model of two objects or more."));
     }
-    if !dataset.holds_approaches() {
-        return Err(EvaluateProblem::NoApproaches.into());
-    }
+    check_approaches(dataset)?;
     let margins = Margins::new(Candidate::Compiled(model), dataset)?;
     let tested: Vec<usize> = (0..model.known_count())
         .map(|object| {
-            let missing = || EvaluateProblem::NoneOf { object: model.object_name(object).into() };
+            let missing = || {
+                problem!("the data set has no approaches to {}", model.object_name(object))
+                    .fix("Capture all of the model's objects.")
+            };
             margins.tested.iter().position(|tested| tested.object == object).ok_or_else(missing)
         })
-        .collect::<Result<_, _>>()?;
+        .collect::<Result<_>>()?;
     let by_pose = tested.iter().map(|&position| {
         let object = &dataset.objects[position];
         // A separation is of single approaches: those of all instances count.
@@ -135,6 +138,23 @@ pub fn plan(model: &Model<'_>, dataset: &Dataset, rolls: u8) -> Result<Planned> 
     })
 }
 
+/// The problem of a model without a plan.
+pub fn no_plan() -> Error {
+    problem!("the model has no plan of approaches").fix(
+        "Add one: `palpate calibrate MODEL DIR -o OUT --plan 4`, from approaches with pose. An ensemble (JSON) has to be exported \
+         first.",
+    )
+}
+
+/// Refuses a data set without approaches, such as one of full touches only.
+pub(crate) fn check_approaches(dataset: &Dataset) -> Result<()> {
+    match dataset.holds_approaches() {
+        true => Ok(()),
+        false => Err(problem!("the data set holds full touches only, without the approaches in between")
+            .fix("Capture every approach: --approaches N --pose.")),
+    }
+}
+
 /// A separation in 128ths.
 fn stored(separation: f64) -> i8 {
     (separation * 128.0).round().clamp(-127.0, 127.0) as i8
@@ -157,9 +177,11 @@ fn fewest(by_pose: &[ByPose], may_touch: &[bool]) -> Result<usize> {
     let counts =
         numbers.flat_map(|(pose, _)| by_pose.iter().map(move |by_pose| (by_pose.count(pose), by_pose.name.as_str())));
     match counts.min_by_key(|(count, _)| *count) {
-        None => Err(EvaluateProblem::NoTouches.into()),
+        None => Err(problem!("no approach touched anything").fix("Check that the probe reaches the objects.")),
         Some((found, name)) if found < LEAST_IN_POSE => {
-            Err(EvaluateProblem::FewInPose { object: name.into(), found, needed: LEAST_IN_POSE }.into())
+            let times = LEAST_IN_POSE.div_ceil(found.max(1)).max(2);
+            Err(problem!("only {found} approaches to {name} are in one of the poses, and a plan needs {LEAST_IN_POSE}")
+                .fix(format!("Capture {times} times as many approaches, or plan fewer rolls.")))
         }
         Some((found, _)) => Ok(found),
     }
@@ -336,21 +358,16 @@ mod tests {
             change(&mut dataset);
             plan(&model, &dataset, rolls).map(|_| ()).unwrap_err()
         };
-        let problem = |error: Error| match error.problem() {
-            Some(problem) => EvaluateProblem::clone(problem),
-            _ => panic!("{error}"),
-        };
         assert!(plan(&model, &good, 1).is_ok());
         assert_eq!(refused(&|_| {}, 3).exit_code(), 2);
         let few = refused(&|dataset| dataset.objects[1].edit(|touches| _ = touches.pop()), 1);
-        let expected = EvaluateProblem::FewInPose { object: "fork".into(), found: 19, needed: LEAST_IN_POSE };
-        assert_eq!(problem(few), expected);
+        assert_eq!(few.what(), "only 19 approaches to fork are in one of the poses, and a plan needs 20");
         let full = refused(&|dataset| dataset.origin.as_mut().unwrap().approaches = false, 1);
-        assert_eq!(problem(full), EvaluateProblem::NoApproaches);
+        assert_eq!(full.what(), "the data set holds full touches only, without the approaches in between");
         let one = refused(&|dataset| dataset.objects.truncate(1), 1);
-        assert_eq!(problem(one), EvaluateProblem::NoneOf { object: "fork".into() });
+        assert_eq!(one.what(), "the data set has no approaches to fork");
         let no_pose = refused(&|dataset| dataset.objects[1].edit(|touches| touches[9] = flat()), 1);
-        assert_eq!(problem(no_pose), EvaluateProblem::NoPoseOf { object: "fork".into() });
+        assert_eq!(no_pose.what(), "there are approaches to fork without the probe's pose");
         let missed = refused(
             &|dataset| {
                 let missed = |touch: &Touch| super::tests::missed().with_pose(touch.pose().unwrap());
@@ -358,6 +375,6 @@ mod tests {
             },
             1,
         );
-        assert_eq!(problem(missed), EvaluateProblem::NoTouches);
+        assert_eq!(missed.what(), "no approach touched anything");
     }
 }

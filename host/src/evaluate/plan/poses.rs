@@ -1,6 +1,6 @@
 //! Approaches by the pose that they were made in, so that a robot can be sent where a plan says.
 
-use crate::error::{EvaluateProblem, Result};
+use crate::error::{Error, Result, problem};
 use crate::evaluate::draws::Draws;
 use crate::random::Purpose;
 use crate::touches::ObjectTouches;
@@ -20,14 +20,13 @@ impl ByPose {
     /// Some approaches to an object, by their positions, such as those of one robot to one of its instances.
     ///
     /// # Errors
-    /// [`EvaluateProblem::NoPoseOf`] for a touch without a pose.
+    /// When a touch has no pose.
     pub(super) fn new(touched: &ObjectTouches, poses: Poses, approaches_of: &[u32]) -> Result<Self> {
         let mut approaches = vec![Vec::new(); poses.count().into()];
         let touches =
             approaches_of.iter().filter_map(|&number| Some((number, touched.touches().get(number as usize)?)));
         for (number, touch) in touches {
-            let no_pose = || EvaluateProblem::NoPoseOf { object: touched.name.clone() };
-            let pose = poses.number_of(&touch.pose().ok_or_else(no_pose)?);
+            let pose = poses.number_of(&touch.pose().ok_or_else(|| no_pose_of(&touched.name))?);
             approaches[usize::from(pose)].push(number);
         }
         Ok(Self { name: touched.name.clone(), approaches })
@@ -43,6 +42,12 @@ impl ByPose {
     pub(super) fn stock(&self, group: usize, seed: u64) -> Stock<'_> {
         Stock { of: self, group: u64::try_from(group).unwrap_or(u64::MAX), seed, draws: HashMap::new() }
     }
+}
+
+/// The problem of approaches to an object without the probe's pose, which a plan needs.
+pub(crate) fn no_pose_of(object: &str) -> Error {
+    problem!("there are approaches to {object} without the probe's pose")
+        .fix("Capture the approaches with their pose: --approaches N --pose.")
 }
 
 /// Approaches of one object that were not drawn yet. One stock for each sequence draws no approach twice in a sequence;

@@ -7,11 +7,12 @@ mod summary;
 
 pub use summary::{ObjectSummary, Quantiles, Summary};
 
+use super::alike::other_position;
 use super::checksum::Checked;
-use super::dataset::name_of;
-use super::warning::channels_said;
-use super::{Entry, Listing, Log, Longest, Origin, Warning, is_log, logs, text};
-use crate::error::{Error, Kind, Place, Result, TouchesProblem};
+use super::dataset::{name_of, no_objects, two_files};
+use super::listing::{missing, other_count};
+use super::{Entry, Finding, Listing, Log, Longest, Origin, is_log, logs, text};
+use crate::error::{Error, Kind, Place, Result};
 use palpate_shared::Touch;
 use std::collections::HashMap;
 use std::fs::File;
@@ -26,18 +27,6 @@ pub struct Check {
     pub findings: Vec<Finding>,
     /// Contents of the data set, as far as they can be read.
     pub summary: Summary,
-}
-
-/// Something that is wrong, or may be.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
-#[non_exhaustive]
-pub struct Finding {
-    /// True if training would be wrong, or fail; otherwise it may be meant.
-    pub is_wrong: bool,
-    /// Place and problem, as a line without a full stop: `data/fork.txt:3: the time -1 is negative`.
-    pub what: String,
-    /// Remedy, as a sentence.
-    pub fix: String,
 }
 
 /// Largest number of wrong lines of a file that are shown; the others are counted.
@@ -92,7 +81,7 @@ impl Check {
         mut findings: Findings,
     ) -> Self {
         match objects {
-            [] => findings.problem(directory, TouchesProblem::NoObjects),
+            [] => findings.error(no_objects().at(Place::file(directory))),
             // Objects are recorded one after the other, and one is enough to teach or to compare.
             [one] => findings.note(
                 directory,
@@ -123,13 +112,13 @@ fn listed(directory: &Path, listing: Listing, findings: &mut Findings) -> Result
     for Entry { name, touches: stated, approaches, crc32, .. } in listing.objects {
         let path = directory.join(format!("{name}.{}", super::files::EXTENSION));
         if !path.exists() {
-            findings.problem(&path, TouchesProblem::Missing { name });
+            findings.error(missing(&name).at(Place::file(&path)));
             continue;
         }
         let before = findings.0.len();
         let (touches, found) = read(&path, &longest, findings)?;
         if findings.0.len() == before && touches.len() as u64 != stated {
-            findings.problem(&path, TouchesProblem::OtherCount { stated, found: touches.len() as u64 });
+            findings.error(other_count(stated, touches.len() as u64).at(Place::file(&path)));
         } else if crc32.is_some_and(|stated| stated != found) {
             findings.note(&path, "changed since its capture", "Capture it again if that is not meant.");
         }
@@ -170,8 +159,7 @@ fn found(directory: &Path, findings: &mut Findings) -> Result<Vec<Read>> {
             match objects.iter_mut().find(|other| other.name == object.name) {
                 Some(other) if other.is_logged => other.touches.extend(object.touches),
                 Some(other) => {
-                    let (file, other) = (other.path.clone(), object.path);
-                    findings.problem(directory, TouchesProblem::TwoFiles { name: object.name, file, other });
+                    findings.error(two_files(&object.name, &other.path, &object.path).at(Place::file(directory)));
                 }
                 None => objects.push(object),
             }
@@ -192,9 +180,7 @@ fn logged(path: &Path, objects: &mut Vec<Read>, findings: &mut Findings) -> Resu
         }
         Ok(read) => read,
     };
-    if let Some(Warning::SkippedChannels { channels, .. }) = skipped {
-        findings.note(path, &format!("skipped {}", channels_said(&channels)), "Nothing needs to be done about them.");
-    }
+    findings.0.extend(skipped);
     for object in found {
         let (name, touches) = (object.name.clone(), object.touches().to_vec());
         // Findings name the object beside the log, where the log is not called like it.
@@ -224,8 +210,8 @@ fn read(path: &Path, longest: &Longest, findings: &mut Findings) -> Result<(Vec<
     if wrong > MOST_LINES {
         findings.wrong(path, format!("{} more lines are wrong", wrong - MOST_LINES), "Correct them, or capture again.");
     }
-    if let Err((line, problem)) = longest.check_all(touches.iter().map(|(line, touch)| (*line, touch))) {
-        findings.error(Error::variant_at(Place::line(path, line), problem));
+    if let Err((line, error)) = longest.check_all(touches.iter().map(|(line, touch)| (*line, touch))) {
+        findings.error(error.at(Place::line(path, line)));
     }
     Ok((touches.into_iter().map(|(_, touch)| touch).collect(), reader.into_inner().checksum()))
 }
@@ -245,17 +231,11 @@ impl Findings {
     }
 
     fn note(&mut self, path: &Path, what: &str, fix: &str) {
-        let what = format!("{}{what}", Place::file(path));
-        self.0.push(Finding { is_wrong: false, what, fix: fix.into() });
-    }
-
-    fn problem(&mut self, path: &Path, problem: TouchesProblem) {
-        self.error(Error::variant_at(Place::file(path), problem));
+        self.0.push(Finding::warning(path, what, fix));
     }
 
     fn error(&mut self, error: Error) {
-        let what = format!("{}{}", error.place(), error.what());
-        self.0.push(Finding { is_wrong: true, what, fix: error.remedy().to_owned() });
+        self.0.push(error.into());
     }
 
     /// Finds problems with all touches of an object together.
@@ -268,14 +248,14 @@ impl Findings {
                 .iter()
                 .any(|finding| finding.is_about(path) || finding.what.starts_with(&format!("{}:", path.display())))
             {
-                self.problem(path, TouchesProblem::NoTouches);
+                self.error(text::no_touches().at(Place::file(path)));
             }
             return;
         }
         let of = |number: usize| format!("{number} of {count} touches");
         let has_position = touches.iter().any(|touch| touch.position().is_some());
         if origin.is_some_and(|origin| origin.position != has_position) {
-            self.problem(path, TouchesProblem::OtherPosition { has_position, others: Listing::STATED });
+            self.error(other_position(has_position, Listing::STATED).at(Place::file(path)));
         }
         let partial = touches.iter().filter(|touch| !touch.is_full()).count();
         if partial > 0 && origin.is_some_and(|origin| !origin.approaches) {
@@ -295,8 +275,8 @@ impl Findings {
         let longest = origin.map_or_else(Longest::default, Origin::longest);
         let is_slip = longest.check_all(touches.iter().map(|touch| ((), touch))).is_ok();
         let too_long = touches.iter().filter(|_| is_slip).filter_map(|touch| longest.check(touch).err());
-        if let Some(problem) = too_long.clone().next() {
-            self.note(path, &format!("{}: {problem}", of(too_long.count())), "Check those lines.");
+        if let Some(error) = too_long.clone().next() {
+            self.note(path, &format!("{}: {}", of(too_long.count()), error.what()), "Check those lines.");
         }
     }
 

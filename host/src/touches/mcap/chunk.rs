@@ -1,9 +1,10 @@
 //! Contents of a chunk: decompressed without C, no further than it says.
 
-use super::LARGEST;
 use super::records::Chunk;
-use crate::error::TouchesProblem;
+use super::{LARGEST, not_mcap};
+use crate::error::{Error, Result, problem};
 use crate::touches::checksum::CRC;
+use crate::touches::logged::too_large;
 use lz4_flex::frame::FrameDecoder;
 use ruzstd::decoding::StreamingDecoder;
 use std::borrow::Cow;
@@ -13,32 +14,35 @@ use std::io::Read;
 const WINDOW: u64 = 16 << 20;
 
 /// The records of a chunk, with the checksum that it states, if it states one.
-pub(super) fn records<'a>(chunk: &Chunk<'a>) -> Result<Cow<'a, [u8]>, TouchesProblem> {
+pub(super) fn records<'a>(chunk: &Chunk<'a>) -> Result<Cow<'a, [u8]>> {
     let Chunk { size: stated, data, .. } = *chunk;
     if stated > LARGEST as u64 {
-        return Err(TouchesProblem::TooLarge { what: "a chunk".into(), bytes: stated, most: LARGEST as u64 });
+        return Err(too_large("a chunk", stated, LARGEST as u64));
     }
     let records = match chunk.compression {
         "" => Cow::Borrowed(data),
         "zstd" => Cow::Owned(zstd(data, stated).map_err(|message| damaged("zstd", &message))?),
         "lz4" => Cow::Owned(lz4(data, stated).map_err(|message| damaged("lz4", &message))?),
-        other => return Err(TouchesProblem::OtherCompression { name: other.into() }),
+        other => {
+            return Err(problem!("a chunk is compressed as {other:?}, where zstd and lz4 are known")
+                .fix("Compress it again: mcap compress LOG -o OTHER.mcap --compression zstd."));
+        }
     };
     if records.len() as u64 != stated {
         let least = if records.len() as u64 > stated { "at least " } else { "" };
-        let message = format!("a chunk holds {least}{} bytes where it states {stated}", records.len());
-        return Err(TouchesProblem::NotMcap { message });
+        let holds = format_args!("a chunk holds {least}{} bytes where it states {stated}", records.len());
+        return Err(not_mcap(holds));
     }
     let (stated, found) = (chunk.crc, CRC.checksum(&records));
     if stated != 0 && stated != found {
-        let message = format!("a chunk is damaged: its checksum is {found:08x} where it states {stated:08x}");
-        return Err(TouchesProblem::NotMcap { message });
+        let differs = format_args!("a chunk is damaged: its checksum is {found:08x} where it states {stated:08x}");
+        return Err(not_mcap(differs));
     }
     Ok(records)
 }
 
-fn damaged(compression: &str, message: &str) -> TouchesProblem {
-    TouchesProblem::NotMcap { message: format!("a chunk is damaged: no {compression}: {message}") }
+fn damaged(compression: &str, message: &str) -> Error {
+    not_mcap(format_args!("a chunk is damaged: no {compression}: {message}"))
 }
 
 /// All frames, one after the other, up to one byte more than `size`.

@@ -1,8 +1,8 @@
 //! A touch's message: JSON and CDR.
 
-use crate::error::TouchesProblem;
-use crate::touches::listing::is_file_name;
-use crate::touches::{located, touch_of_seconds};
+use crate::error::{Result, problem};
+use crate::touches::files::check_name;
+use crate::touches::seconds::{located, touch_of_seconds};
 use byteorder::{BigEndian, LittleEndian};
 use palpate_shared::Touch;
 use serde::Deserialize;
@@ -52,13 +52,10 @@ struct CdrLocated {
 
 impl Encoding {
     /// Decodes a message: a touch, and its object if that is known.
-    pub(super) fn read(self, data: &[u8]) -> Result<(Touch, Option<String>), TouchesProblem> {
+    pub(super) fn read(self, data: &[u8]) -> Result<(Touch, Option<String>)> {
         match self {
             Self::Json => {
-                let wrong = |error: serde_json::Error| TouchesProblem::BadMessage {
-                    what: "touch in JSON",
-                    message: error.to_string(),
-                };
+                let wrong = |error| problem!("no touch in JSON: {error}");
                 touch(serde_json::from_slice(data).map_err(wrong)?)
             }
             Self::Cdr => {
@@ -71,8 +68,8 @@ impl Encoding {
 }
 
 /// A message behind its header of four bytes, which says how numbers are ordered.
-fn cdr<T: serde::de::DeserializeOwned>(data: &[u8]) -> Result<T, TouchesProblem> {
-    let wrong = |message: String| TouchesProblem::BadMessage { what: "touch in CDR", message };
+fn cdr<T: serde::de::DeserializeOwned>(data: &[u8]) -> Result<T> {
+    let wrong = |why: String| problem!("no touch in CDR: {why}");
     let Some((&[first, kind, _, _], body)) = data.split_first_chunk() else {
         return Err(wrong(format!("{} bytes, where its header has 4", data.len())));
     };
@@ -89,7 +86,7 @@ fn cdr<T: serde::de::DeserializeOwned>(data: &[u8]) -> Result<T, TouchesProblem>
     }
 }
 
-fn felt(touched: CdrTouch, position: Option<[f64; 3]>) -> Result<(Touch, Option<String>), TouchesProblem> {
+fn felt(touched: CdrTouch, position: Option<[f64; 3]>) -> Result<(Touch, Option<String>)> {
     let CdrTouch { times, has_pose, direction, alignment, object } = touched;
     touch(JsonTouch {
         times: times.map(|time| (!time.is_nan()).then_some(time)),
@@ -99,12 +96,10 @@ fn felt(touched: CdrTouch, position: Option<[f64; 3]>) -> Result<(Touch, Option<
     })
 }
 
-fn touch(message: JsonTouch) -> Result<(Touch, Option<String>), TouchesProblem> {
+fn touch(message: JsonTouch) -> Result<(Touch, Option<String>)> {
     let JsonTouch { times, pose, position, object } = message;
     let object = object.filter(|object| !object.is_empty());
-    if let Some(name) = object.as_ref().filter(|name| !is_file_name(name)) {
-        return Err(TouchesProblem::BadName { name: name.clone() });
-    }
+    object.as_deref().map_or(Ok(()), check_name)?;
     let (direction, alignment) = pose.map(|JsonPose { direction, alignment }| (direction, alignment)).unzip();
     let touch = touch_of_seconds(times, direction, alignment)?;
     let touch = match position {

@@ -13,6 +13,9 @@ mod records;
 
 pub use read::read;
 
+use crate::error::{Error, problem};
+use std::fmt::Display;
+
 /// The largest record, compressed and decompressed, that is read: 64 MiB.
 pub const LARGEST: usize = 64 << 20;
 
@@ -21,3 +24,11 @@ pub const TOUCH: &str = include_str!("../../../msg/Touch.msg");
 
 /// The names of the schema of touches, as JSON and in ROS 2.
 const NAMES: [&str; 2] = ["palpate.Touch", "palpate_msgs/msg/Touch"];
+
+/// The problem of a file that is no log in MCAP, or is damaged.
+fn not_mcap(why: impl Display) -> Error {
+    problem!("not a usable MCAP file: {why}").fix("Repair it with `mcap recover`, or copy the log again.")
+}
+
+/// Remedy for a message that is not what its schema says.
+const CORRECT: &str = "Correct the program that logged it: docs/reference/mcap.md says what belongs in a message.";

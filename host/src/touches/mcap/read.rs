@@ -2,9 +2,9 @@
 
 use super::message::Encoding;
 use super::records::{self, Chunk};
-use super::{LARGEST, NAMES, TOUCH, chunk};
-use crate::error::{Error, Place, Result, TouchesProblem};
-use crate::touches::logged::{Channels, Message};
+use super::{CORRECT, LARGEST, NAMES, TOUCH, chunk, not_mcap};
+use crate::error::{Error, Place, Result, problem};
+use crate::touches::logged::{Channels, Message, too_large};
 use ::mcap::records::op;
 use ::mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use ::mcap::{MAGIC, McapError};
@@ -20,6 +20,8 @@ const MOST_NAMES: usize = 16 << 20;
 const HEAD: usize = 9;
 /// The end of the definition of a touch that earlier versions did not have.
 const LOCATED: &str = "; bool has_position; float64[3] position";
+/// Remedy for channels of touches in other encodings, or by other definitions.
+const LOG_OTHERWISE: &str = "Log them as docs/reference/mcap.md says: JSON, or CDR by the definitions in host/msg.";
 /// The latest log time, in nanoseconds: in the year 2262.
 const LATEST: u64 = i64::MAX as u64;
 
@@ -47,7 +49,7 @@ pub fn read(mut bytes: impl Read, path: &Path, each: impl FnMut(Message) -> Resu
                     McapError::BadMagic => Place::file(path),
                     _ => Place::byte(path, offset),
                 };
-                return Err(Error::variant_at(place, problem(error)));
+                return Err(unread(error).at(place));
             }
             Some(Ok(LinearReadEvent::ReadRequest(count))) => {
                 let buffer = reader.insert(count.clamp(1, STEP));
@@ -59,7 +61,7 @@ pub fn read(mut bytes: impl Read, path: &Path, each: impl FnMut(Message) -> Resu
                 };
                 // Said here, since a short text would be called a log that ends early.
                 if is_first && count > 0 && buffer[0] != MAGIC[0] {
-                    return Err(Error::variant_at(Place::file(path), problem(McapError::BadMagic)));
+                    return Err(unread(McapError::BadMagic).at(Place::file(path)));
                 }
                 is_first = false;
                 reader.notify_read(count);
@@ -105,10 +107,10 @@ struct Channel {
 
 impl<F: FnMut(Message) -> Result<()>> Reading<'_, F> {
     fn record(&mut self, opcode: u8, data: &[u8], offset: u64) -> Result<()> {
-        let wrong = |problem| Error::variant_at(Place::byte(self.path, offset), problem);
         match opcode {
             op::CHUNK => {
-                let records = Chunk::of(data).and_then(|chunk| chunk::records(&chunk)).map_err(wrong)?;
+                let records = Chunk::of(data).and_then(|chunk| chunk::records(&chunk));
+                let records = records.map_err(|error| error.at(Place::byte(self.path, offset)))?;
                 self.chunk(&records, offset)
             }
             _ => self.plain(opcode, data, offset),
@@ -118,11 +120,9 @@ impl<F: FnMut(Message) -> Result<()>> Reading<'_, F> {
     /// The records of a chunk, which begins at `offset`.
     fn chunk(&mut self, mut records: &[u8], offset: u64) -> Result<()> {
         while !records.is_empty() {
-            let next = split(records).ok_or_else(|| {
-                let message = "a record is longer than the chunk that it stands in".into();
-                Error::variant_at(Place::byte(self.path, offset), TouchesProblem::NotMcap { message })
-            });
-            let (opcode, data, rest) = next?;
+            let (opcode, data, rest) = split(records).ok_or_else(|| {
+                not_mcap("a record is longer than the chunk that it stands in").at(Place::byte(self.path, offset))
+            })?;
             self.plain(opcode, data, offset)?;
             records = rest;
         }
@@ -132,7 +132,7 @@ impl<F: FnMut(Message) -> Result<()>> Reading<'_, F> {
     /// A record other than a chunk.
     fn plain(&mut self, opcode: u8, data: &[u8], offset: u64) -> Result<()> {
         let path = self.path;
-        let wrong = |problem| Error::variant_at(Place::byte(path, offset), problem);
+        let wrong = |error: Error| error.at(Place::byte(path, offset));
         match opcode {
             op::SCHEMA => {
                 let records::Schema { id, name, encoding, data } = records::Schema::of(data).map_err(wrong)?;
@@ -149,11 +149,11 @@ impl<F: FnMut(Message) -> Result<()>> Reading<'_, F> {
         }
     }
 
-    fn schema(&mut self, id: u16, schema: Schema) -> Result<(), TouchesProblem> {
+    fn schema(&mut self, id: u16, schema: Schema) -> Result<()> {
         match self.schemas.get(&id) {
             // Files repeat them.
             Some(same) if *same == schema => Ok(()),
-            Some(_) => Err(not_mcap(format!("schema {id} is defined twice, and differently"))),
+            Some(_) => Err(not_mcap(format_args!("schema {id} is defined twice, and differently"))),
             None => {
                 let definition = schema.definition.as_ref().map_or(0, String::len);
                 self.take(schema.name.len() + schema.encoding.len() + definition)?;
@@ -163,19 +163,19 @@ impl<F: FnMut(Message) -> Result<()>> Reading<'_, F> {
         }
     }
 
-    fn channel(&mut self, id: u16, mut channel: Channel) -> Result<(), TouchesProblem> {
+    fn channel(&mut self, id: u16, mut channel: Channel) -> Result<()> {
         if let Some(same) = self.channels.get(&id) {
             let key = |channel: &Channel| (channel.schema, channel.topic.clone(), channel.encoding.clone());
             return match key(same) == key(&channel) {
                 true => Ok(()),
-                false => Err(not_mcap(format!("channel {id} is defined twice, and differently"))),
+                false => Err(not_mcap(format_args!("channel {id} is defined twice, and differently"))),
             };
         }
         self.take(channel.topic.len() + channel.encoding.len())?;
         let Channel { topic, schema: number, encoding, .. } = &channel;
         let schema = self.schemas.get(number);
         if *number != 0 && schema.is_none() {
-            return Err(not_mcap(format!("{topic} has the schema {number}, which is missing")));
+            return Err(not_mcap(format_args!("{topic} has the schema {number}, which is missing")));
         }
         if let Some(schema) = schema.filter(|schema| NAMES.contains(&schema.name.as_str())) {
             let said = || format!("{topic} ({})", schema.name);
@@ -187,15 +187,17 @@ impl<F: FnMut(Message) -> Result<()>> Reading<'_, F> {
                     if expected.strip_suffix(LOCATED) == Some(found.as_str()) {
                         Encoding::CdrBefore
                     } else if found != expected {
-                        let found = found.chars().take(300).collect();
-                        return Err(TouchesProblem::OtherDefinition { channel: said(), found, expected });
+                        let found: String = found.chars().take(300).collect();
+                        let what = problem!("{} is defined as {found:?}, where Palpate has {expected:?}", said());
+                        return Err(what.fix(LOG_OTHERWISE));
                     } else {
                         Encoding::Cdr
                     }
                 }
                 (encoding, schema) => {
-                    let (channel, encoding, schema) = (said(), encoding.into(), schema.into());
-                    return Err(TouchesProblem::OtherEncoding { channel, encoding, schema });
+                    let channel = said();
+                    return Err(problem!("{channel} is in the encoding {encoding:?} with a schema in {schema:?}")
+                        .fix(LOG_OTHERWISE));
                 }
             });
         }
@@ -204,31 +206,30 @@ impl<F: FnMut(Message) -> Result<()>> Reading<'_, F> {
     }
 
     fn message(&mut self, message: &records::Message<'_>, offset: u64) -> Result<()> {
-        let wrong = |problem| Error::variant_at(Place::byte(self.path, offset), problem);
+        let place = Place::byte(self.path, offset);
         let Some(channel) = self.channels.get_mut(&message.channel) else {
-            return Err(wrong(not_mcap(format!("a message of channel {}, which is missing", message.channel))));
+            let channel = message.channel;
+            return Err(not_mcap(format_args!("a message of channel {channel}, which is missing")).at(place));
         };
         channel.messages += 1;
         let Some(encoding) = channel.reads else { return Ok(()) };
         let read = match message.log_time {
             ..=LATEST => encoding.read(message.data),
-            time => Err(TouchesProblem::BadMessage { what: "log time", message: format!("{time} ns, after 2262") }),
+            time => Err(problem!("no log time: {time} ns, after 2262")),
         };
-        let read = read.map_err(|problem| {
-            let (topic, number) = (channel.topic.clone(), channel.messages);
-            wrong(TouchesProblem::Message { topic, number, problem: problem.into() })
-        });
-        let (touch, object) = read?;
+        let (touch, object) = read.map_err(|error| {
+            let (topic, number) = (&channel.topic, channel.messages);
+            error.within(format_args!("message {number} on {topic}: ")).fix(CORRECT).at(place)
+        })?;
         (self.each)(Message { time: message.log_time, offset, touch, object })
     }
 
     /// Takes memory for names.
-    fn take(&mut self, bytes: usize) -> Result<(), TouchesProblem> {
+    fn take(&mut self, bytes: usize) -> Result<()> {
         self.names += bytes;
-        let most = MOST_NAMES as u64;
         match self.names <= MOST_NAMES {
             true => Ok(()),
-            false => Err(TouchesProblem::TooLarge { what: "names of channels".into(), bytes: self.names as u64, most }),
+            false => Err(too_large("names of channels", self.names as u64, MOST_NAMES as u64)),
         }
     }
 
@@ -243,8 +244,7 @@ impl<F: FnMut(Message) -> Result<()>> Reading<'_, F> {
             }
         }
         if channels.touches.is_empty() {
-            let problem = TouchesProblem::NoTouchChannel { channels: channels.others };
-            return Err(Error::variant_at(Place::file(self.path), problem));
+            return Err(no_touch_channel(&channels.others).at(Place::file(self.path)));
         }
         Ok(channels)
     }
@@ -258,18 +258,26 @@ fn split(records: &[u8]) -> Option<(u8, &[u8], &[u8])> {
     Some((opcode, data, rest))
 }
 
-fn not_mcap(message: String) -> TouchesProblem {
-    TouchesProblem::NotMcap { message }
+/// The problem of a log that has these channels, and none of touches.
+fn no_touch_channel(channels: &[String]) -> Error {
+    const SHOWN: usize = 20;
+    let shown = channels.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join(", ");
+    let they = match channels.len() {
+        0 => "no channel at all".into(),
+        ..=SHOWN => shown,
+        count => format!("{shown} and {} more", count - SHOWN),
+    };
+    problem!("no channel of touches in this log: it has {they}").fix(
+        "Name the schema of the touches palpate.Touch, or in ROS 2 palpate_msgs/msg/Touch: docs/reference/mcap.md.",
+    )
 }
 
-fn problem(error: McapError) -> TouchesProblem {
-    not_mcap(match error {
-        McapError::BadMagic => "it does not begin or end as one".into(),
-        McapError::UnexpectedEof => "it ends early".into(),
-        McapError::RecordTooLarge { len, .. } => {
-            return TouchesProblem::TooLarge { what: "a record".into(), bytes: len, most: LARGEST as u64 };
-        }
+fn unread(error: McapError) -> Error {
+    match error {
+        McapError::BadMagic => not_mcap("it does not begin or end as one"),
+        McapError::UnexpectedEof => not_mcap("it ends early"),
+        McapError::RecordTooLarge { len, .. } => too_large("a record", len, LARGEST as u64),
         // On one line.
-        other => other.to_string().split_whitespace().collect::<Vec<_>>().join(" "),
-    })
+        other => not_mcap(other.to_string().split_whitespace().collect::<Vec<_>>().join(" ")),
+    }
 }

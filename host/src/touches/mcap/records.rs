@@ -2,7 +2,8 @@
 //!
 //! `mcap::parse_record` asks for as much memory as a string says that it is long.
 
-use crate::error::TouchesProblem;
+use super::not_mcap;
+use crate::error::{Error, Result};
 
 /// A schema: how messages are built.
 pub(super) struct Schema<'a> {
@@ -39,7 +40,7 @@ pub(super) struct Chunk<'a> {
 }
 
 impl<'a> Schema<'a> {
-    pub(super) fn of(record: &'a [u8]) -> Result<Self, TouchesProblem> {
+    pub(super) fn of(record: &'a [u8]) -> Result<Self> {
         let mut fields = Fields(record, "schema");
         let (id, name, encoding) = (fields.u16()?, fields.text()?, fields.text()?);
         let length = fields.u32()?;
@@ -49,14 +50,14 @@ impl<'a> Schema<'a> {
 
 impl<'a> Channel<'a> {
     /// Its metadata are not looked at.
-    pub(super) fn of(record: &'a [u8]) -> Result<Self, TouchesProblem> {
+    pub(super) fn of(record: &'a [u8]) -> Result<Self> {
         let mut fields = Fields(record, "channel");
         Ok(Self { id: fields.u16()?, schema: fields.u16()?, topic: fields.text()?, encoding: fields.text()? })
     }
 }
 
 impl<'a> Message<'a> {
-    pub(super) fn of(record: &'a [u8]) -> Result<Self, TouchesProblem> {
+    pub(super) fn of(record: &'a [u8]) -> Result<Self> {
         let mut fields = Fields(record, "message");
         let (channel, _sequence, log_time, _publish_time) =
             (fields.u16()?, fields.u32()?, fields.u64()?, fields.u64()?);
@@ -65,7 +66,7 @@ impl<'a> Message<'a> {
 }
 
 impl<'a> Chunk<'a> {
-    pub(super) fn of(record: &'a [u8]) -> Result<Self, TouchesProblem> {
+    pub(super) fn of(record: &'a [u8]) -> Result<Self> {
         let mut fields = Fields(record, "chunk");
         let (_first, _last, size, crc) = (fields.u64()?, fields.u64()?, fields.u64()?, fields.u32()?);
         let compression = fields.text()?;
@@ -78,38 +79,38 @@ impl<'a> Chunk<'a> {
 struct Fields<'a>(&'a [u8], &'static str);
 
 impl<'a> Fields<'a> {
-    fn bytes(&mut self, count: u64) -> Result<&'a [u8], TouchesProblem> {
+    fn bytes(&mut self, count: u64) -> Result<&'a [u8]> {
         let count = usize::try_from(count).unwrap_or(usize::MAX);
         let (bytes, rest) = self.0.split_at_checked(count).ok_or_else(|| self.wrong("is shorter than it says"))?;
         self.0 = rest;
         Ok(bytes)
     }
 
-    fn number<const N: usize>(&mut self) -> Result<[u8; N], TouchesProblem> {
+    fn number<const N: usize>(&mut self) -> Result<[u8; N]> {
         let (bytes, rest) = self.0.split_first_chunk().ok_or_else(|| self.wrong("is shorter than its fields"))?;
         self.0 = rest;
         Ok(*bytes)
     }
 
-    fn u16(&mut self) -> Result<u16, TouchesProblem> {
+    fn u16(&mut self) -> Result<u16> {
         self.number().map(u16::from_le_bytes)
     }
 
-    fn u32(&mut self) -> Result<u32, TouchesProblem> {
+    fn u32(&mut self) -> Result<u32> {
         self.number().map(u32::from_le_bytes)
     }
 
-    fn u64(&mut self) -> Result<u64, TouchesProblem> {
+    fn u64(&mut self) -> Result<u64> {
         self.number().map(u64::from_le_bytes)
     }
 
-    fn text(&mut self) -> Result<&'a str, TouchesProblem> {
+    fn text(&mut self) -> Result<&'a str> {
         let length = self.u32()?;
         let bytes = self.bytes(length.into())?;
         std::str::from_utf8(bytes).map_err(|_| self.wrong("has a name that is no text (no UTF-8)"))
     }
 
-    fn wrong(&self, what: &str) -> TouchesProblem {
-        TouchesProblem::NotMcap { message: format!("a {} {what}", self.1) }
+    fn wrong(&self, what: &str) -> Error {
+        not_mcap(format_args!("a {} {what}", self.1))
     }
 }

@@ -8,11 +8,13 @@
 #[cfg(test)]
 mod tests;
 
+use super::alike::other_position;
 use super::checksum::CRC;
-use super::files::files;
-use super::listing::is_file_name;
-use super::{Entry, Listing, Longest, Origin, Warning, text, write_touch};
-use crate::error::{Error, Place, Result, TouchesProblem};
+use super::dataset::changed;
+use super::files::{check_name, files};
+use super::listing::{missing, other_count};
+use super::{Entry, Finding, Listing, Longest, Origin, text, write_touch};
+use crate::error::{Error, Place, Result, problem};
 use crate::output;
 use crc::{Digest, Table};
 use palpate_shared::Touch;
@@ -62,7 +64,7 @@ pub struct Recording {
     before: u64,
     /// Touches that were added since it was opened.
     added: u64,
-    warnings: Vec<Warning>,
+    warnings: Vec<Finding>,
     checkpointed: Instant,
     /// Held as long as the recording lives.
     _lock: File,
@@ -97,20 +99,30 @@ impl Recording {
             Some((object, placement)) => (object, Some(placement)),
             None => (object, None),
         };
-        if let Some(&name) = std::iter::once(&object).chain(&placement).find(|name| !is_file_name(name)) {
-            return Err(TouchesProblem::BadName { name: name.into() }.into());
-        }
+        std::iter::once(object).chain(placement).try_for_each(check_name)?;
         std::fs::create_dir_all(directory).map_err(|error| Error::io(directory, "make the directory", error))?;
-        let wrong = |problem| Error::variant_at(Place::file(directory), problem);
-        let lock = output::lock(directory)?.ok_or_else(|| wrong(TouchesProblem::Busy))?;
+        let here = |error: Error| error.at(Place::file(directory));
+        let busy = || {
+            here(
+                problem!("another program is writing into this directory")
+                    .fix("Wait until it is done, or give another directory."),
+            )
+        };
+        let unlisted = |files: &str| {
+            here(
+                problem!("holds {files}, which dataset.json does not list")
+                    .fix("Give another directory, or move the files away."),
+            )
+        };
+        let lock = output::lock(directory)?.ok_or_else(busy)?;
         output::remove_leftovers(directory)?;
         let listing = match Listing::read(directory)? {
-            Some(listing) => admit(listing, origin).map_err(wrong)?,
+            Some(listing) => admit(listing, origin).map_err(here)?,
             None => {
                 let names = |(_, path): &(_, PathBuf)| path.file_name().map(|name| name.display().to_string());
                 let files: Vec<String> = files(directory)?.iter().filter_map(names).collect();
                 if !files.is_empty() {
-                    return Err(wrong(TouchesProblem::Unlisted { files: files.join(", ") }));
+                    return Err(unlisted(&files.join(", ")));
                 }
                 let usual = || Origin::recorded(super::Origin::default().probe, Length::Tenth, false);
                 Listing::new(&origin.cloned().unwrap_or_else(usual), [])
@@ -119,8 +131,7 @@ impl Recording {
         let path = Entry { name: object.into(), ..Entry::default() }.file(directory);
         let is_listed = listing.objects.iter().any(|entry| entry.name == object);
         if !is_listed && path.metadata().is_ok_and(|there| there.len() > 0) {
-            let files = path.file_name().unwrap_or_default().display().to_string();
-            return Err(wrong(TouchesProblem::Unlisted { files }));
+            return Err(unlisted(&path.file_name().unwrap_or_default().display().to_string()));
         }
         let recorded = Recorded {
             object: object.into(),
@@ -172,7 +183,7 @@ impl Recording {
     }
 
     /// Warnings about the touches that the object had before.
-    pub fn warnings(&self) -> &[Warning] {
+    pub fn warnings(&self) -> &[Finding] {
         &self.warnings
     }
 
@@ -215,16 +226,15 @@ impl Recording {
         let has_position = touch.position().is_some();
         match has_position == self.listing.origin.position {
             true => Ok(()),
-            false => Err(TouchesProblem::OtherPosition { has_position, others: "the touches recorded here" }.into()),
+            false => Err(other_position(has_position, "the touches recorded here")),
         }
     }
 
     /// Adds a touch. When this returns, the touch is on the disk.
     ///
     /// # Errors
-    /// [`TouchesProblem::NoPose`] if it lacks its pose; [`TouchesProblem::OtherPosition`] if it lacks its position, or has one
-    /// where the others have none; [`TouchesProblem::LaterThanStroke`] if a contact is
-    /// later than the stroke that the data set states; when the file cannot be written.
+    /// When it lacks its pose or its position, or has a position where the others have none; when a contact is later than
+    /// the stroke that the data set states; when the file cannot be written.
     pub fn add(&mut self, touch: &Touch) -> Result<()> {
         self.append(std::slice::from_ref(touch))?;
         if self.checkpointed.elapsed() >= CHECKPOINT { self.checkpoint() } else { Ok(()) }
@@ -233,14 +243,15 @@ impl Recording {
     /// Adds the touches of a file: all or, if one of them is wrong, none.
     ///
     /// # Errors
-    /// Errors of [`add`](Self::add), and [`TouchesProblem::RecordedBefore`] if the same touches of the object were.
+    /// Errors of [`add`](Self::add), and when the same touches of the object were recorded before.
     pub fn add_all(&mut self, touches: &[Touch]) -> Result<()> {
         let crc32 = CRC.checksum(lines(touches).as_bytes());
         let is_same = |other: &&Recorded| {
             (&other.object, other.crc32, other.touches) == (&self.recorded.object, Some(crc32), touches.len() as u64)
         };
         if let Some(Recorded { object, touches, began, .. }) = self.listing.recorded.iter().find(is_same).cloned() {
-            return Err(TouchesProblem::RecordedBefore { object, touches, began }.into());
+            return Err(problem!("the same {touches} touches of {object} were recorded before, on {began}")
+                .fix("Give other lines."));
         }
         self.recorded.crc32 = Some(crc32);
         self.append(touches)?;
@@ -249,7 +260,8 @@ impl Recording {
 
     fn append(&mut self, touches: &[Touch]) -> Result<()> {
         if touches.iter().any(|touch| self.lacks_pose(touch)) {
-            return Err(TouchesProblem::NoPose.into());
+            return Err(problem!("no pose, but this data set is recorded with one")
+                .fix("Give direction and alignment after the times, or record without the pose."));
         }
         touches.iter().try_for_each(|touch| self.check_position(touch))?;
         let probe = &self.listing.origin.probe;
@@ -259,8 +271,12 @@ impl Recording {
             let seconds = |micros: f64| format!("{:.3} s", micros / 1e6);
             let [window, latest] =
                 [probe.window().map(f64::from), latest].map(|micros| seconds(micros.unwrap_or_default()));
-            let stroke = format!("{stroke} ({window}), which explains contacts up to {latest}");
-            return Err(TouchesProblem::LaterThanStroke { stroke, latest: seconds(touch.spread().into()) }.into());
+            let contact = seconds(touch.spread().into());
+            return Err(problem!(
+                "a contact {contact} after the first, and this data set is recorded with a stroke of {stroke} ({window}), which \
+                 explains contacts up to {latest}"
+            )
+            .fix("Give the probe file the stroke that the hand has, and record into another directory."));
         }
         let lines = lines(touches);
         if self.recorded.touches == 0 {
@@ -328,15 +344,17 @@ impl Open {
 }
 
 /// A recorded listing to add to.
-fn admit(listing: Listing, origin: Option<&Origin>) -> Result<Listing, TouchesProblem> {
+fn admit(listing: Listing, origin: Option<&Origin>) -> Result<Listing> {
     if !listing.is_recorded() {
-        let (objects, touches) = (listing.names().join(", "), listing.objects.iter().map(|entry| entry.touches).sum());
-        return Err(TouchesProblem::HoldsSimulated { objects, touches });
+        let touches: u64 = listing.objects.iter().map(|entry| entry.touches).sum();
+        return Err(problem!("holds {touches} simulated touches of {}", listing.names().join(", "))
+            .fix("Give another directory: recorded and simulated touches are not mixed."));
     }
     let differences = origin.map_or_else(Vec::new, |origin| differences(&listing.origin, origin));
     match differences.is_empty() {
         true => Ok(listing),
-        false => Err(TouchesProblem::OtherRecording { differences: differences.join(", ") }),
+        false => Err(problem!("cannot add to these recorded touches: {}", differences.join(", "))
+            .fix("Record as these touches were, or into another directory.")),
     }
 }
 
@@ -368,11 +386,11 @@ fn differences(there: &Origin, here: &Origin) -> Vec<String> {
 }
 
 /// The touches of a recorded object: at least as many as listed.
-pub(super) fn read(entry: &Entry, path: &Path, longest: &Longest, warnings: &mut Vec<Warning>) -> Result<Vec<Touch>> {
+pub(super) fn read(entry: &Entry, path: &Path, longest: &Longest, warnings: &mut Vec<Finding>) -> Result<Vec<Touch>> {
     let bytes = match std::fs::read(path) {
         Err(error) if error.kind() == ErrorKind::NotFound && entry.touches == 0 => return Ok(Vec::new()),
         Err(error) if error.kind() == ErrorKind::NotFound => {
-            return Err(Error::variant_at(Place::file(path), TouchesProblem::Missing { name: entry.name.clone() }));
+            return Err(missing(&entry.name).at(Place::file(path)));
         }
         read => read.map_err(|error| Error::io(path, "read the touches", error))?,
     };
@@ -380,13 +398,14 @@ pub(super) fn read(entry: &Entry, path: &Path, longest: &Longest, warnings: &mut
     let touches = text::within(whole, path, longest)?;
     let (stated, found) = (entry.touches, touches.len() as u64);
     if found < stated {
-        return Err(Error::variant_at(Place::file(path), TouchesProblem::OtherCount { stated, found }));
+        return Err(other_count(stated, found).at(Place::file(path)));
     }
     if whole.len() < bytes.len() {
-        warnings.push(Warning::HalfLine { path: path.into() });
+        let what = "its last line is not whole and was not read: a recording was interrupted";
+        warnings.push(Finding::warning(path, what, "Record the touch again if it matters."));
     }
     if found == stated && entry.crc32.is_some_and(|stated| stated != CRC.checksum(whole)) {
-        warnings.push(Warning::Changed { path: path.into() });
+        warnings.push(changed(path));
     }
     Ok(touches)
 }

@@ -2,7 +2,6 @@ mod located;
 
 use crate::fixtures::*;
 use palpate::capture::{Sampler, Settings, capture, in_memory, scenes, touches};
-use palpate::error::{CaptureProblem, Result};
 use palpate::mesh::Instance;
 use palpate::probe::approach::Approach;
 use palpate::probe::hand;
@@ -150,12 +149,12 @@ fn wrong_settings_are_wrong_arguments() {
 }
 
 /// Reason why a capture of these objects into the directory is refused.
-fn refusal(objects: &[Object], settings: &Settings, directory: &Path) -> CaptureProblem {
+fn refusal(objects: &[Object], settings: &Settings, directory: &Path) -> String {
     let before = read_files(directory);
     let error = capture(objects, settings, directory, &()).unwrap_err();
     assert_eq!(error.exit_code(), 1);
     assert_eq!(read_files(directory), before, "what is there must stay");
-    error.problem::<CaptureProblem>().unwrap_or_else(|| panic!("{error}")).clone()
+    error.what().to_owned()
 }
 
 fn globe_called(name: &str) -> Object {
@@ -178,8 +177,8 @@ fn a_capture_into_a_directory_with_touches_from_elsewhere_is_refused() {
     for name in ["fork.txt", "globe.txt"] {
         std::fs::write(directory.path().join(name), "0 0 0\n").unwrap();
     }
-    let holds = CaptureProblem::HoldsOthers { files: vec!["fork.txt".into(), "globe.txt".into()] };
-    assert_eq!(refusal(&objects(), &with(origin(20)), directory.path()), holds);
+    let refused = refusal(&objects(), &with(origin(20)), directory.path());
+    assert_eq!(refused, "holds fork.txt, globe.txt, which this capture would not write");
 }
 
 #[test]
@@ -226,7 +225,7 @@ fn a_cancelled_capture_leaves_nothing_and_what_was_there_as_it_was() {
 fn a_directory_is_replaced_by_the_same_capture_or_by_force_only() {
     let place = tempfile::tempdir().unwrap();
     let directory = place.path().join("data");
-    let holds = |files: &[&str]| CaptureProblem::HoldsOthers { files: files.iter().map(ToString::to_string).collect() };
+    let holds = |files: &[&str]| format!("holds {}, which this capture would not write", files.join(", "));
     capture(&objects(), &with(origin(20)), &directory, &()).unwrap();
     let all = holds(&["dataset.json", "disc.txt", "globe.txt"]);
     let [disc, globe] = objects().try_into().unwrap();
@@ -312,9 +311,8 @@ fn an_object_at_its_true_size_is_scaled_to_millimeters() {
     let probe = with!(Probe::default(), radius = 1.5, spacing = 15.0, speed = 100.0);
     let origin = Origin { unit, probe, ..origin(50) };
     let mut object = Object::new("globe", Mesh::globe(12));
-    let problem = |result: Result<Vec<Vec<Scene>>>| result.unwrap_err().problem::<CaptureProblem>().cloned();
-    let unknown = problem(scenes(&[&object], &origin, &()));
-    assert_eq!(unknown, Some(CaptureProblem::NoTrueSize { name: "globe".into() }));
+    let unknown = scenes(&[&object], &origin, &()).unwrap_err();
+    assert_eq!(unknown.what(), "globe: the true size is unknown, because the mesh states no unit");
     // Meters: about two of them.
     object.millimeters = Some(1_000.0);
     let [low, high] = scenes(&[&object], &origin, &()).unwrap()[0][0].bounds();

@@ -2,9 +2,10 @@
 
 use crate::commands::Global;
 use palpate::Result;
-use palpate::error::{Error, Place, TouchesProblem};
+use palpate::error::{Place, problem};
 use palpate::touches::Origin;
 use palpate::touches::check::{Check, ObjectSummary, Quantiles, Summary};
+use palpate::wording::counted;
 use palpate_shared::format::Length;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -27,7 +28,9 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
     global.print(&check, || text(&check))?;
     match check.wrong() {
         0 => Ok(()),
-        count => Err(Error::variant_at(Place::file(&arguments.directory), TouchesProblem::WouldTrainWrong { count })),
+        count => Err(problem!("training on these touches would be wrong, for {}", counted(count, "reason", "reasons"))
+            .fix("Correct the faults listed above, then check again.")
+            .at(Place::file(&arguments.directory))),
     }
 }
 
@@ -36,7 +39,8 @@ fn text(check: &Check) -> String {
     let mut text = String::new();
     for finding in &check.findings {
         let kind = if finding.is_wrong { "wrong" } else { "note" };
-        _ = writeln!(text, "{kind}: {}. {}", finding.what, finding.fix);
+        let fix = if finding.fix.is_empty() { String::new() } else { format!(". {}", finding.fix) };
+        _ = writeln!(text, "{kind}: {finding}{fix}");
     }
     if !check.findings.is_empty() {
         text.push('\n');

@@ -3,6 +3,7 @@
 use crate::commands::link::LineOptions;
 use crate::commands::link::record::{RecordArguments, from_chip, summary};
 use crate::commands::{Global, remark};
+use palpate::error::{Place, problem};
 use palpate::touches::{Log, Longest, begins_log, text};
 use palpate::{Error, Result, output};
 use std::fs::File;
@@ -101,7 +102,9 @@ fn read(mut lines: impl BufRead, source: &Path, object: &str, longest: &Longest)
     }
     let touches = text::within(lines, source, longest)?;
     match touches.is_empty() {
-        true => Err(Error::variant_at(palpate::error::Place::file(source), palpate::error::TouchesProblem::NoTouches)),
+        true => Err(problem!("no touches in it")
+            .fix("Give a line for each touch: three times in seconds, - for a missing contact.")
+            .at(Place::file(source))),
         false => Ok(touches),
     }
 }
