@@ -75,6 +75,12 @@ pub enum Kind {
     Cancelled,
     /// Standard output was closed by its reader (`palpate … | head`): not an error for the user.
     Closed,
+    /// A promise is not kept: too many are wrong at every threshold that was tested.
+    NotKept,
+    /// Nothing is recorded of something that a promise is for.
+    NotRecorded,
+    /// There are too few cases for a promise.
+    TooFew,
 }
 
 /// A problem as a value: where it is, what is wrong, what to do. It is made where it arises:
