@@ -88,6 +88,10 @@ pub enum Kind {
     Exists,
     /// Margins of a library do not belong to the rows or the outputs of the model that is compared with them.
     Margins,
+    /// A promise is not kept: too many are wrong at every threshold that was tested.
+    NotKept,
+    /// Nothing is recorded of something that a promise is for.
+    NotRecorded,
     /// Predictions of a library do not belong to the rows or the outputs of the model that is compared with them.
     Predictions,
     /// There is too little data for what was asked.

@@ -8,7 +8,7 @@ use palpate::calibrate::{self, Calibrated};
 use palpate::capture;
 use palpate::compile::{self, Compiled, CompiledModel};
 use palpate::ensemble::{StatedProbe, train};
-use palpate::error::{CalibrateProblem, Result};
+use palpate::error::{Kind, Result, problem};
 use palpate::evaluate::parity::{self, Parity};
 use palpate::evaluate::{self, Candidate, Curve, Evaluation, Margins, PromiseCheck};
 use palpate::mesh::Object;
@@ -19,7 +19,6 @@ use palpate::touches::folds::{self, Split};
 use palpate::touches::{Dataset, Listing, ObjectTouches, Origin};
 use palpate::with;
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
-use palpate_report::error::ReportProblem;
 use palpate_report::play::{self, Contender};
 use palpate_report::results;
 use palpate_report::run_page::{RunResults, run_page};
@@ -219,7 +218,7 @@ pub struct Recognition {
 /// `summary.json`.
 ///
 /// # Errors
-/// [`ReportProblem::OtherResults`] if `out` holds results that were made from something else, unless
+/// Results in `out` that were made from something else, unless
 /// [`Settings::replace`]; [`Kind::Cancelled`](palpate::error::Kind::Cancelled); and what capture, training, compiling,
 /// evaluating or writing return.
 pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn Progress) -> Result<Summary> {
@@ -435,10 +434,8 @@ fn calibrated(bytes: &[u8], split: &Split, job: &Job<'_>) -> Result<Result<Calib
     );
     let kept = &mut *job.kept.borrow_mut();
     match calibrate::calibrate_fresh(&compile::open(bytes)?, job.objects, &origin, &terms, kept, job.progress) {
-        Err(error) => match error.problem() {
-            Some(problem) => Ok(Err(CalibrateProblem::to_string(problem))),
-            _ => Err(error),
-        },
+        Err(error) if matches!(error.kind(), Kind::NotKept | Kind::TooFew) => Ok(Err(error.what().into())),
+        Err(error) => Err(error),
         Ok(calibrated) => Ok(Ok(calibrated)),
     }
 }
@@ -450,7 +447,7 @@ fn model_path(out: &Path, stem: &str) -> PathBuf {
 /// Pushes one object's test touches, of one instance, until the recognizer has its verdict.
 fn recognize(model: &Model<'_>, touched: &ObjectTouches) -> Result<Recognition> {
     let mut recognizer = Recognizer::<256>::new(model, Stopping::from_model(model))
-        .map_err(|_| ReportProblem::TooManyObjects { objects: model.object_count() })?;
+        .map_err(|_| problem!("a model of {} objects", model.object_count()).fix("Use at most 256 objects."))?;
     let mut approaches = 0;
     let mut push = |touch| {
         approaches += 1;
@@ -557,7 +554,7 @@ mod tests {
         // The same again may replace them, and gives the same models; anything else may not, and changes nothing.
         let model = std::fs::read(out.join("model.palpate")).unwrap();
         let error = run(&objects()[..2], &settings(300), &out, &()).unwrap_err();
-        assert!(matches!(error.problem::<ReportProblem>(), Some(ReportProblem::OtherResults { .. })), "{error}");
+        assert!(error.to_string().contains("the directory holds results of another run"), "{error}");
         let fewer = Settings { approaches: 900, ..settings(200) };
         let error = run(&objects(), &fewer, &out, &()).unwrap_err().to_string();
         assert!(error.contains("summary.json: ") && error.contains("touches was 300, and is 200 now"), "{error}");

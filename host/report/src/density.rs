@@ -7,9 +7,8 @@
 //!
 //! The result is written as an [`Ensemble`] of a single tree with one leaf per cell, so that it is evaluated like any other model.
 
-use crate::error::ReportProblem;
 use palpate::ensemble::{Ensemble, Node, Output, Provenance, Tree, feature_row, inputs};
-use palpate::error::Result;
+use palpate::error::{Result, problem};
 use palpate::touches::Dataset;
 use palpate_shared::Descriptor;
 use rayon::prelude::*;
@@ -32,7 +31,7 @@ struct Grids {
 /// all touches.
 ///
 /// # Errors
-/// [`ReportProblem::NotTwoFeatures`].
+/// A descriptor that has not exactly two features.
 pub(super) fn density_model(descriptor: Descriptor, train: &Dataset, held_out: &Dataset) -> Result<(Ensemble, f64)> {
     let (train_rows, held_rows) = (rows(descriptor, train)?, rows(descriptor, held_out)?);
     let edges = [0, 1].map(|feature| edges(&train_rows, feature));
@@ -62,8 +61,9 @@ fn rows(descriptor: Descriptor, data: &Dataset) -> Result<Vec<Vec<[f32; 2]>>> {
         .map(|object| {
             let row = |touch| <[f32; 2]>::try_from(feature_row(descriptor, touch)).ok();
             object.touches().par_iter().map(row).collect::<Option<Vec<_>>>().ok_or_else(|| {
-                let features = descriptor.feature_count();
-                ReportProblem::NotTwoFeatures { descriptor: descriptor.name().into(), features }.into()
+                let (name, features) = (descriptor.name(), descriptor.feature_count());
+                problem!("the descriptor {name} has {features} features, not two")
+                    .fix("Estimate densities for the descriptor curvature only.")
             })
         })
         .collect()

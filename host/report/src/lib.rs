@@ -9,7 +9,6 @@ mod context;
 mod cost;
 mod cross_validation;
 mod density;
-pub mod error;
 mod instructions;
 mod limit;
 mod measured;
@@ -33,3 +32,8 @@ pub mod watch;
 
 pub use settings::{Part, Settings};
 pub use stages::{Report, report};
+
+/// The error of something that cannot fail.
+pub(crate) fn bug(what: String) -> palpate::error::Error {
+    palpate::error::Error::new(what).fix("Report this as a bug.")
+}

@@ -11,7 +11,7 @@ use crate::page::document::{Figure, Section};
 use crate::page::table::{Cell, Records, Table};
 use palpate::calibrate::{self, Limit, Odds, Per, Sequence, Terms, choose, follow, margin_of, odds_of};
 use palpate::compile;
-use palpate::error::{CalibrateProblem, Result};
+use palpate::error::{Kind, Result};
 use palpate::probe::scene::Scene;
 use palpate::touches::Origin;
 use palpate::with;
@@ -114,7 +114,7 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Promises> {
         let terms = Terms { rate, confidence: CONFIDENCE, per };
         match choose(sequences, &names, strictest(), &terms) {
             Ok(chosen) => Ok(Some(chosen.odds)),
-            Err(error) if error.problem::<CalibrateProblem>().is_some() => Ok(None),
+            Err(error) if matches!(error.kind(), Kind::NotKept | Kind::TooFew) => Ok(None),
             Err(error) => Err(error),
         }
     };

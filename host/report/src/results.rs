@@ -1,7 +1,7 @@
 //! Whose results a directory holds, so that a run never replaces another one's unasked.
 
-use crate::error::ReportProblem;
-use palpate::error::{Error, Place, Result};
+use crate::bug;
+use palpate::error::{Error, Place, Result, problem};
 use serde::Serialize;
 use serde_json::Value;
 use std::path::Path;
@@ -16,11 +16,13 @@ const MADE_FROM: &str = "made_from";
 /// `trace`, an earlier run was interrupted, and its files may be replaced too; any other of `files` is somebody's.
 ///
 /// # Errors
-/// [`ReportProblem::OtherResults`] naming the file, or [`Kind::Io`](palpate::error::Kind::Io).
+/// Names the file that is of other results; [`Kind::Io`](palpate::error::Kind::Io).
 pub fn refuse_others(directory: &Path, made_from: &Value, files: &[&str], trace: Option<&str>) -> Result<()> {
     let summary = directory.join(SUMMARY);
-    let refused =
-        |path: &Path, found: String| Err(Error::variant_at(Place::file(path), ReportProblem::OtherResults { found }));
+    let refused = |path: &Path, found: String| {
+        let others = problem!("the directory holds results of another run: {found}");
+        Err(others.fix("Choose another directory, or force the replacement.").at(Place::file(path)))
+    };
     match std::fs::read(&summary) {
         Ok(bytes) => {
             let stated =
@@ -60,9 +62,9 @@ fn difference(stated: &Value, wanted: &Value) -> String {
 /// A value as JSON.
 ///
 /// # Errors
-/// [`ReportProblem::Json`].
+/// A value that JSON has no form for.
 pub fn json(what: &'static str, value: &impl Serialize) -> Result<Value> {
-    serde_json::to_value(value).map_err(|error| ReportProblem::Json { what, reason: error.to_string() }.into())
+    serde_json::to_value(value).map_err(|error| bug(format!("cannot write the {what} as JSON: {error}")))
 }
 
 #[cfg(test)]
@@ -82,8 +84,7 @@ mod tests {
         // A file of somebody's; beside the trace of an interrupted run it is a run's own.
         std::fs::write(place.join("model.palpate"), "").unwrap();
         let error = check(&own).unwrap_err();
-        assert!(error.to_string().contains("model.palpate: "), "{error}");
-        assert!(matches!(error.problem::<ReportProblem>(), Some(ReportProblem::OtherResults { .. })));
+        assert_says(error, &["model.palpate: the directory holds results of another run"]);
         std::fs::create_dir(place.join("data")).unwrap();
         check(&own).unwrap();
 

@@ -4,10 +4,9 @@ use super::context::{Context, get_or_try};
 use super::measured::Measured;
 use super::settings::{Part, Settings};
 use super::{cost, cross_validation, limit, noise, objects, promises, published, results};
-use crate::error::ReportProblem;
 use crate::page::document::{Page, Section};
 use crate::page::table::{Cell, Records, Table};
-use palpate::error::Result;
+use palpate::error::{Result, problem};
 use palpate::mesh::Object;
 use palpate::output::write_json;
 use palpate::progress::{self, Progress};
@@ -88,8 +87,8 @@ impl Stages<'_> {
 /// figures' and tables' files and `summary.json`. Another report's or run's results are replaced only if `replace` is true.
 ///
 /// # Errors
-/// Errors of `objects`, of measuring and of writing; [`ReportProblem::OneObject`] for fewer than two objects;
-/// [`ReportProblem::OtherResults`] for a directory that holds other results, unless `replace`;
+/// Errors of `objects`, of measuring and of writing; fewer than two objects; a directory that holds other results, unless
+/// `replace`;
 /// [`Kind::Cancelled`](palpate::error::Kind::Cancelled).
 pub fn report(
     objects: &dyn Fn() -> Result<Vec<Object>>,
@@ -105,7 +104,8 @@ pub fn report(
     }
     let objects = objects()?;
     if objects.len() < 2 {
-        return Err(ReportProblem::OneObject.into());
+        let one = problem!("there is only one object, and nothing to distinguish it from");
+        return Err(one.fix("Give at least two objects."));
     }
     let began = Instant::now();
     let progress = &Named { progress, stage: Mutex::new("objects".into()) };
@@ -415,9 +415,7 @@ mod tests {
         let summary = place.path().join("summary.json");
         std::fs::write(&summary, json!({"made_from": {"job": "run"}}).to_string()).unwrap();
         let error = report(&settings, place.path(), false, &()).unwrap_err();
-        let problem = error.problem::<ReportProblem>();
-        assert!(matches!(problem, Some(ReportProblem::OtherResults { .. })), "{error}");
-        assert!(error.to_string().contains("summary.json: "), "{error}");
+        assert!(error.to_string().contains("summary.json: the directory holds results of another run"), "{error}");
         assert_eq!(std::fs::read_to_string(summary).unwrap(), json!({"made_from": {"job": "run"}}).to_string());
     }
 

@@ -3,7 +3,7 @@
 use super::begin::Seen;
 use super::terms::Terms;
 use super::walk::{Kept, Stop, Tally, walk};
-use crate::error::{CalibrateProblem, Result, Supplied};
+use crate::error::Result;
 use crate::evidence::{Odds, Sequence, odds_of, totals};
 use palpate_shared::format::Per;
 use rayon::prelude::*;
@@ -85,39 +85,29 @@ pub struct Chosen {
 /// the rates of all names are kept at once with the stated probability. Nothing is adjusted to the sequences tested on.
 ///
 /// # Errors
-/// [`CalibrateProblem`], if no threshold keeps the promise or too few names are given to know.
+/// [`Kind::NotKept`](crate::error::Kind::NotKept) if no threshold keeps the promise;
+/// [`Kind::TooFew`](crate::error::Kind::TooFew) if too few names are given to know.
 pub fn choose(sequences: &[Sequence], objects: &[String], strictest: f64, terms: &Terms) -> Result<Chosen> {
     let names = sequences.len() as f64 / By::of(terms.per, objects.len()).count().max(1) as f64;
     let count = Seen::nothing(names * share_tested(terms.per), strictest).most_starts(terms);
     let starts = spread(strictest, count, terms.rate);
-    Ok(chosen(sequences, objects, &Way { starts: &starts, loosest: None }, terms, None)?)
+    let way = Way { starts: &starts, loosest: None };
+    choose_independent(sequences, objects.len(), &way, terms).map_err(|stop| {
+        let remedy = match stop.is_too_few(terms.rate) {
+            true => "Give more sequences, or promise a higher error rate.",
+            false => {
+                "Train the model for the noise of these touches, or promise a higher error rate; more touches of the \
+                 calibration may also help."
+            }
+        };
+        stop.of_names(objects, terms).fix(remedy)
+    })
 }
 
 /// The share of sequences that are not learned from.
 pub(crate) fn share_tested(per: Per) -> f64 {
     let share = 1.0 / LEARNED as f64;
     if per == Per::Name { 1.0 - share } else { 1.0 }
-}
-
-/// Chooses thresholds from starts; `supplied` is what the sequences used up, if they did.
-pub(crate) fn chosen(
-    sequences: &[Sequence],
-    objects: &[String],
-    way: &Way<'_>,
-    terms: &Terms,
-    supplied: Option<Supplied>,
-) -> Result<Chosen, CalibrateProblem> {
-    let Terms { rate, per, .. } = *terms;
-    let of = |position: usize| (per != Per::Average).then(|| objects.get(position).cloned()).flatten();
-    choose_independent(sequences, objects.len(), way, terms).map_err(|stop| match stop {
-        Stop::TooFew { position, found, needed } => {
-            CalibrateProblem::TooFew { object: of(position), rate, found, needed, supplied }
-        }
-        Stop::TooMany { position, tally: Tally { wrong, all }, needed } => {
-            CalibrateProblem::NotKept { object: of(position), rate, wrong, given: all, needed, remedy: None }
-        }
-        Stop::Looser => CalibrateProblem::Looser { rate },
-    })
 }
 
 /// The thresholds that are kept, and the sequences that they were tested on.

@@ -38,7 +38,6 @@ mod calibrated;
 mod choose;
 mod demand;
 mod draw;
-pub(crate) mod error;
 mod found;
 mod fresh;
 mod groups;
@@ -46,6 +45,7 @@ mod model;
 mod recorded;
 #[cfg(all(test, feature = "train"))]
 mod recorded_tests;
+mod refused;
 mod temperature;
 mod terms;
 #[cfg(all(test, feature = "train"))]
@@ -59,7 +59,7 @@ pub(crate) use calibrated::Stated;
 pub use calibrated::{Calibrated, Gain, Guarded, OfObject, OfRecorded, OfRows, Used, Worse};
 pub(crate) use choose::share_tested;
 pub use choose::{Chosen, choose};
-pub(crate) use choose::{Way, choose_independent, chosen};
+pub(crate) use choose::{Way, choose_independent};
 #[cfg(all(test, feature = "train"))]
 use draw::MarginSupply;
 pub use draw::{TouchSupply, follow};
@@ -71,6 +71,7 @@ pub use model::{Settings, calibrate};
 pub(crate) use model::{Start, add_noise, begin, calibrate_from};
 pub use palpate_shared::format::Per;
 pub use recorded::calibrate_recorded;
+pub(crate) use refused::{Tested, at_best, percent};
 pub use terms::Terms;
 
 pub use temperature::temperature;

@@ -4,15 +4,15 @@
 use super::begin::Begin;
 use super::begin::Seen;
 use super::calibrated::{Calibrated, OfObject, Stated};
-use super::choose::{Chosen, Way, chosen, share_tested, spread};
+use super::choose::{Chosen, Way, choose_independent, share_tested, spread};
 use super::draw::{TouchSupply, follow, follow_plan};
-use super::error::Remedy;
+use super::refused::{Supplied, Tested};
 use super::temperature::temperature;
 use super::terms::Terms;
-use super::{Limit, Per, Tally};
+use super::{Limit, Per};
 use crate::compile;
 use crate::ensemble::StatedProbe;
-use crate::error::{CalibrateProblem, Error, Result, Supplied};
+use crate::error::{Error, Kind, Result, problem};
 use crate::evaluate::{Candidate, OfTouches, check_approaches, no_plan};
 use crate::evidence::{Odds, Sequence, odds_of, totals};
 use crate::probe::noise::Noise;
@@ -70,10 +70,9 @@ impl Default for Settings {
 /// back and sequences end as unknown where the chip's would, and the promise is one of the model with its test.
 ///
 /// # Errors
-/// [`CalibrateProblem`], if no threshold keeps the promise, too few names are given to know, or the data set lacks an
-/// object; as [`Margins::new`](crate::evaluate::Margins::new) for touches that the model cannot use;
-/// [`Kind::Setting`](crate::error::Kind::Setting) for settings out of their ranges;
-/// [`Kind::Cancelled`](crate::error::Kind::Cancelled).
+/// [`Kind::NotKept`] if no threshold keeps the promise; [`Kind::TooFew`] if too few names are given to know; a data set that
+/// lacks an object of the model; errors of [`Margins::new`](crate::evaluate::Margins::new) for touches that the model cannot
+/// use; [`Kind::Setting`] for settings out of their ranges; [`Kind::Cancelled`].
 pub fn calibrate(
     model: &Model<'_>,
     dataset: Dataset,
@@ -90,6 +89,8 @@ pub(crate) struct Start {
     pub(crate) margin: f64,
     /// Thresholds that those to be kept must be as strict as.
     pub(crate) loosest: Option<Odds>,
+    /// The share of all touches there are that the calibration is on, for advice on how many it takes.
+    pub(crate) share: f64,
 }
 
 /// Like [`calibrate`], from a given start instead of one that a few sequences suggest.
@@ -286,8 +287,11 @@ pub(super) fn calibrate_drawn(
     let mut first: Vec<TouchSupply<'_>> = supplies.iter_mut().map(|supply| supply.take_part(PILOT)).collect();
     material.follow_plan(dataset, &mut first)?;
     material.follow_plan(dataset, &mut supplies)?;
+    let share = start.as_ref().map_or(1.0, |start| start.share);
     let (starts, loosest, sequences) = match start {
-        Some(Start { margin, loosest }) => (vec![margin], loosest, draw(&mut supplies, settings.sequences, margin)?),
+        Some(Start { margin, loosest, .. }) => {
+            (vec![margin], loosest, draw(&mut supplies, settings.sequences, margin)?)
+        }
         None => {
             let pilot = draw(&mut first, (settings.sequences / PILOT).max(1), naive + STRICTEST[1])?;
             let is_enough = is_kept_well(&pilot, naive + STRICTEST[0], settings.rate);
@@ -298,17 +302,17 @@ pub(super) fn calibrate_drawn(
             (spread(strictest, seen.most_starts(&terms), settings.rate), None, sequences)
         }
     };
-    let supplied = (sequences.len() < material.wanted(settings.sequences).iter().sum())
-        .then(|| Supplied { approaches: dataset.holds_approaches(), fewest });
     let way = Way { starts: &starts, loosest: loosest.as_ref() };
-    let chosen = chosen(&sequences, names, &way, &terms, supplied).map_err(|mut problem| {
-        if let CalibrateProblem::NotKept { wrong, given, remedy, .. } = &mut problem {
-            let both = [model.noise().unwrap_or_default(), dataset.real().and(&settings.noise).trained()];
-            let noise = (both[0] != both[1]).then(|| both.map(|noise| Noise::of_training(&noise).to_string()));
-            let tally = Tally { wrong: *wrong, all: *given };
-            *remedy = Some(Box::new(Remedy::new(tally, &terms, supplied, sequences.len(), noise)));
-        }
-        problem
+    let chosen = choose_independent(&sequences, names.len(), &way, &terms).map_err(|stop| {
+        let both = [model.noise().unwrap_or_default(), dataset.real().and(&settings.noise).trained()];
+        let what = if dataset.holds_approaches() { "approaches" } else { "touches" };
+        let are_used_up = sequences.len() < material.wanted(settings.sequences).iter().sum();
+        let tested = Tested {
+            supplied: are_used_up.then(|| Supplied { what, fewest: (fewest as f64 / share).round() as u64 }),
+            sequences: sequences.len(),
+            noise: (both[0] != both[1]).then(|| both.map(|noise| Noise::of_training(&noise).to_string())),
+        };
+        tested.problem(&stop, names, &terms)
     })?;
     finished(material, dataset, settings, &chosen, temperature()?)
 }
@@ -322,16 +326,28 @@ pub(super) fn named(model: &Model<'_>, dataset: &Dataset) -> Result<(Vec<String>
     // A background is not touched, and never named.
     names.truncate(model.known_count());
     if names.len() < 2 {
-        return Err(CalibrateProblem::OneObject.into());
+        let one = problem!("the model knows only one object: there is nothing to mistake it for");
+        return Err(one.fix("Give a model of two or more objects."));
     }
     let there: BTreeSet<usize> =
         dataset.objects.iter().flat_map(|touched| candidate.outputs_of(&touched.name)).collect();
     let missing: Vec<String> =
         (0..names.len()).filter(|output| !there.contains(output)).map(|output| names[output].clone()).collect();
+    let objects = missing.join(", ");
     match (missing.is_empty(), dataset.is_recorded()) {
         (true, _) => Ok((names, known)),
-        (false, false) => Err(CalibrateProblem::Missing { objects: missing }.into()),
-        (false, true) => Err(CalibrateProblem::MissingRecordings { objects: missing }.into()),
+        (false, false) => Err(problem!("the data set has no touches of {objects}")
+            .fix("Capture them too, with another seed than the training's.")),
+        (false, true) => {
+            let remedy = match objects.contains('/') {
+                true => {
+                    "Record it too: `palpate data record --object OBJECT/PLACEMENT`, or --object OBJECT where the robot does \
+                     not know how it lies."
+                }
+                false => "Record it too: a promise is for all objects of the model.",
+            };
+            Err(problem!("nothing is recorded of {objects}").fix(remedy).as_kind(Kind::NotRecorded))
+        }
     }
 }
 

@@ -16,12 +16,12 @@
 use super::calibrated::Calibrated;
 use super::calibrated::OfRecorded;
 use super::choose::{By, steps, summary, tallies};
-use super::error::{Enough, Forecast, GROWN, GROWTH, LIKELY};
 use super::model::{Material, STRICTEST, Settings, add_noise, finished, noise_seed};
+use super::refused::{GROWN, GROWTH, LIKELY, percent};
 use super::temperature::temperature;
 use super::terms::Terms;
 use super::walk::{Kept, Stop, Tally, allowed, binomial_tail, needed, walk};
-use crate::error::{CalibrateProblem, Result};
+use crate::error::{Error, Result};
 use crate::evaluate::{Candidate, OfTouches};
 use crate::evidence::{Odds, Sequence, margin_of};
 use crate::probe::noise::Noise;
@@ -43,7 +43,7 @@ const RATES: [f64; 17] =
 /// their own. The model was trained on neither.
 ///
 /// # Errors
-/// Errors of [`calibrate`](fn@super::calibrate); [`CalibrateProblem::NotSupported`] if the recordings do not support the rate.
+/// Errors of [`calibrate`](fn@super::calibrate), for the recordings if they do not support the rate.
 pub fn calibrate_recorded(
     model: &Model<'_>,
     mut simulated: Dataset,
@@ -78,7 +78,7 @@ pub fn calibrate_recorded(
         let found = tallies.get(fewest).map_or(0, |tally| tally.all);
         if found < needed(terms.rate, terms.confidence) {
             let needed = needed(terms.rate, terms.confidence);
-            return Err(foreseen.problem(Stop::TooFew { position: fewest, found, needed }, names, &terms).into());
+            return Err(foreseen.problem(&Stop::TooFew { position: fewest, found, needed }, names, &terms));
         }
     }
     let mut failed = None;
@@ -94,7 +94,7 @@ pub fn calibrate_recorded(
     if let Some(error) = failed {
         return Err(error);
     }
-    let Kept { threshold: step, tallies } = kept.map_err(|stop| foreseen.problem(stop, names, &terms))?;
+    let Kept { threshold: step, tallies } = kept.map_err(|stop| foreseen.problem(&stop, names, &terms))?;
     let (sequences, _) = of_step(&steps[step])?;
     let chosen = summary(steps[step].clone(), tallies, &sequences.iter().collect::<Vec<_>>(), names.len());
     let temperature = temperature(model, recorded, &material.known);
@@ -190,45 +190,45 @@ impl Foreseen {
         (is_hopeless && names < needed(terms.rate, terms.confidence) as f64).then_some(chosen)
     }
 
-    /// The approaches that so many times the sequences of the recordings take at a threshold.
-    fn enough(&self, times: f64, step: usize) -> Enough {
-        let Some(Step { scale, used, .. }) = self.steps.get(step) else { return Enough::default() };
-        let mut each: Vec<(u64, String)> = used
-            .iter()
-            .zip(&self.names)
-            .map(|(&used, name)| (two_digits(used as f64 * scale * times), name.clone()))
-            .collect();
+    /// The approaches that so many times the sequences of the recordings take at a threshold, in words. Objects that are hard to
+    /// distinguish take more approaches, and as many sequences.
+    fn enough(&self, times: f64, step: usize) -> Option<String> {
+        let Step { scale, used, .. } = self.steps.get(step)?;
+        let approaches = |used: u64| two_digits(used as f64 * scale * times);
+        let mut each: Vec<_> = used.iter().zip(&self.names).map(|(&used, name)| (approaches(used), name)).collect();
         each.sort();
-        let all = two_digits(used.iter().sum::<u64>() as f64 * scale * times);
-        let ends = each.first().cloned().zip(each.last().cloned());
-        ends.map_or_else(Enough::default, |(least, most)| Enough { all, least, most })
+        let ((least, easy), (most, hard)) = (each.first()?, each.last()?);
+        let all = approaches(used.iter().sum());
+        Some(format!("{all} in all, from {least} to {easy} to {most} to {hard}"))
     }
 
-    /// The reason why no threshold was kept.
-    fn problem(&self, stop: Stop, names: &[String], terms: &Terms) -> CalibrateProblem {
+    /// The reason why no threshold was kept, with the rate that the recordings support and how many support this one, as far as
+    /// the simulation is right.
+    fn problem(&self, stop: &Stop, names: &[String], terms: &Terms) -> Error {
         let Terms { rate, confidence, per } = *terms;
         let is_likely = |times: f64, rate: f64| self.best(times, rate, confidence).0 >= LIKELY;
-        let higher = || RATES.iter().copied().filter(|&higher| higher > rate);
-        let enough = (0..GROWN).map(|step| GROWTH.powi(step)).find(|&times| is_likely(times, rate));
-        let enough = enough.map(|times| self.enough(times, self.best(times, rate, confidence).1));
-        let (position, tally, supported) = match stop {
-            Stop::TooFew { position, found, .. } => {
-                let tally = Tally { wrong: 0, all: found };
-                (position, tally, higher().find(|&rate| is_likely(1.0, rate)))
-            }
-            Stop::Looser => (0, Tally::default(), None),
+        let mut higher = RATES.iter().copied().filter(|&higher| higher > rate);
+        let supported = match *stop {
             // What was found says more than what was foreseen.
-            Stop::TooMany { position, tally, .. } => {
-                (position, tally, higher().find(|&rate| binomial_tail(tally, rate) <= 1.0 - confidence))
+            Stop::TooMany { tally, .. } => higher.find(|&rate| binomial_tail(tally, rate) <= 1.0 - confidence),
+            _ => higher.find(|&rate| is_likely(1.0, rate)),
+        };
+        let supported = supported.map(|rate| {
+            format!("{} recorded approaches to each object support about {} %. ", self.fewest, percent(rate))
+        });
+        let times = (0..GROWN).map(|step| GROWTH.powi(step)).find(|&times| is_likely(times, rate));
+        let enough = times.and_then(|times| self.enough(times, self.best(times, rate, confidence).1));
+        let enough =
+            enough.map(|enough| format!("{} % takes about {enough}, if the simulation is right. ", percent(rate)));
+        let remedy = match stop.is_too_few(rate) {
+            true => "Record more, or promise a higher error rate.",
+            false => {
+                "Promise a higher error rate, record more, or bring the simulation nearer to the recordings: fit the probe \
+                 (`palpate probe fit`), or adjust the model to other recordings (`palpate train --teach`)."
             }
         };
-        CalibrateProblem::NotSupported {
-            object: (per != super::Per::Average).then(|| names.get(position).cloned()).flatten(),
-            rate,
-            tally,
-            needed: needed(rate, confidence),
-            forecast: Box::new(Forecast { approaches: self.fewest, supported, enough }),
-        }
+        let cases = stop.cases("names given", names, per) + " on the recordings";
+        stop.problem(rate, &cases).fix(supported.unwrap_or_default() + &enough.unwrap_or_default() + remedy)
     }
 }
 

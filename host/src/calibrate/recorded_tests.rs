@@ -1,5 +1,4 @@
 use super::*;
-use crate::error::CalibrateProblem;
 use crate::tests::synthetic::{self, MODEL};
 use crate::touches::{Dataset, ObjectTouches, Recorded, Source};
 
@@ -24,9 +23,9 @@ fn recordings_with_too_many_wrong_names_are_refused_with_the_rate_that_they_supp
         vec![(session("first"), 1_600), (session("second"), 400)],
     );
     let error = calibrate_recorded(&MODEL.model(), simulated(30_000, 2), &wrong, &settings(0.02), &()).unwrap_err();
-    let Some(CalibrateProblem::NotSupported { tally, forecast, .. }) = error.problem() else { panic!("{error}") };
-    assert!(tally.wrong > 2 && error.to_string().contains("too many to promise 2 %"), "{error}");
-    assert!(forecast.supported.unwrap() > 0.02, "{error}");
+    assert!(error.what().starts_with("no threshold that was tested keeps 2 %: at the best "), "{error}");
+    assert!(error.what().ends_with(" names given on the recordings are wrong"), "{error}");
+    assert!(error.remedy().starts_with("2000 recorded approaches to each object support about "), "{error}");
 }
 
 fn session(began: &str) -> Source {

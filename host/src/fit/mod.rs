@@ -36,7 +36,6 @@
 mod advice;
 mod candidate;
 mod density;
-pub(crate) mod error;
 mod late;
 mod layer;
 mod likelihood;
@@ -58,7 +57,7 @@ pub use outcome::{Fit, GrazingEstimate, Warning};
 pub use words::{Estimate, NOT_TOLD, between, offset, offset_between};
 
 use crate::capture;
-use crate::error::{Error, FitProblem, Result};
+use crate::error::{Error, Result, problem};
 use crate::mesh::Object;
 use crate::probe::noise::Noise;
 use crate::probe::scene::Scene;
@@ -131,9 +130,9 @@ impl Evidence<'_> {
 /// processor for ten meshes and 300 recorded approaches to four of them, twice that where touches have poses.
 ///
 /// # Errors
-/// [`FitProblem::NotRecorded`] if a recorded object is not among the objects; [`FitProblem::FewRecorded`] for fewer than
-/// [`LEAST`] touches with two or three contacts; [`FitProblem::OtherStroke`] if the recordings show another stroke than the
-/// probe states; as [`crate::capture::touches`]; [`Kind::Cancelled`](crate::error::Kind::Cancelled).
+/// A recorded object that is not among the objects; fewer than [`LEAST`] touches with two or three contacts; recordings that
+/// show another stroke than the probe states; errors of [`crate::capture::touches`];
+/// [`Kind::Cancelled`](crate::error::Kind::Cancelled).
 pub fn fit(
     recorded: &Dataset,
     objects: &[Object],
@@ -182,7 +181,10 @@ fn useful(recorded: &Dataset, touched: &[Touched], plate: Option<&[Touch]>) -> R
     let useful = |touch: &&Touch| Observed::of(touch).contacts() >= 2;
     let found = recorded.touches().chain(plate.into_iter().flatten()).filter(useful).count();
     if found < LEAST {
-        return Err(FitProblem::FewRecorded { touches: found, least: LEAST }.into());
+        let few =
+            problem!("only {found} recorded touches with two or three contacts, and a fit needs at least {LEAST}");
+        return Err(few
+            .fix("Record a few hundred approaches to objects whose meshes you have; 60 presses on a plate help too."));
     }
     Ok(of)
 }
@@ -230,8 +232,11 @@ fn fit_to(
 
 /// The index of the object or placement of a recording with this name.
 fn place<'a>(name: &str, known: impl Iterator<Item = &'a str> + Clone) -> Result<usize> {
-    let problem = || FitProblem::NotRecorded { name: name.into(), known: known.clone().map(str::to_owned).collect() };
-    touched::place(name, known.clone()).ok_or_else(|| problem().into())
+    touched::place(name, known.clone()).ok_or_else(|| {
+        let known = known.collect::<Vec<_>>().join(", ");
+        problem!("{name} was recorded, but is not among the objects: {known}")
+            .fix("Give its mesh as well, under the recording's name, or leave the recording out.")
+    })
 }
 
 /// The approaches that were recorded, as far as the touches say: every one if some touched nothing, only full touches

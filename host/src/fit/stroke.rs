@@ -4,7 +4,7 @@
 //! after it: by about the time of one more contact, at the rate of the simulated ones there.
 
 use super::words::Estimate;
-use crate::error::{FitProblem, Result};
+use crate::error::{Result, problem};
 use crate::probe::approach::Probe;
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_shared::Touch;
@@ -31,22 +31,19 @@ pub(super) struct Stroke {
 /// as it should be to the object of each recording, which no stroke ended.
 ///
 /// # Errors
-/// [`FitProblem::OtherStroke`] if the recordings show another stroke than the probe states.
-pub(super) fn stroke(
-    recorded: &Dataset,
-    simulated: &[&[Touch]],
-    kept: Counted,
-    probe: &Probe,
-) -> Result<Stroke, FitProblem> {
+/// Recordings that show another stroke than the probe states.
+pub(super) fn stroke(recorded: &Dataset, simulated: &[&[Touch]], kept: Counted, probe: &Probe) -> Result<Stroke> {
     let stated = probe.window().map(f64::from);
     let spread = |touch: &Touch| f64::from(touch.spread());
     let latest =
         recorded.objects.iter().flat_map(|object| object.touches().iter().map(move |touch| (object, spread(touch))));
     let Some((object, latest)) = latest.max_by(|a, b| a.1.total_cmp(&b.1)) else { return Ok(Stroke::default()) };
     let length = |micros: f64| micros / 1e6 * probe.speed;
-    let other = |found: String| FitProblem::OtherStroke {
-        stated: format!("{} ({:.3} s)", probe.stroke.unwrap_or_default(), stated.unwrap_or_default() / 1e6),
-        found,
+    let other = |found: String| {
+        let (stroke, seconds) = (probe.stroke.unwrap_or_default(), stated.unwrap_or_default() / 1e6);
+        problem!("the probe states a stroke of {stroke} ({seconds:.3} s), and in the recordings {found}").fix(
+            "Give the stroke that the touches were recorded with, or none: it is then estimated from the recordings.",
+        )
     };
     if probe.latest().is_some_and(|allowed| latest > allowed) {
         let found = format!("a contact with {} is {:.3} s after the first", object.name, latest / 1e6);

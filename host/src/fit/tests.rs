@@ -285,7 +285,7 @@ fn a_few_touches_give_warnings_and_too_few_an_error() {
     assert!(found.warnings.iter().any(|warning| warning.record.contains("approaches")), "{:?}", found.warnings);
     let few = recorded(&objects()[..1], 12, 12, &BENT);
     let error = fit(&few, &objects(), None, &settings(), &()).unwrap_err();
-    assert!(matches!(error.problem::<FitProblem>(), Some(FitProblem::FewRecorded { .. })), "{error}");
+    assert!(error.to_string().starts_with("only 11 recorded touches with two or three contacts"), "{error}");
 }
 
 #[test]
@@ -369,7 +369,6 @@ fn a_stated_stroke_is_kept_and_recordings_of_another_are_refused_with_both() {
         (6.0, ["a stroke of 6 (0.600 s)", "no contact is later than 0."]),
     ] {
         let error = stating(stroke).unwrap_err();
-        assert!(matches!(error.problem::<FitProblem>(), Some(FitProblem::OtherStroke { .. })), "{error}");
         assert!(parts.iter().all(|part| error.to_string().contains(part)), "{error}");
     }
 }

@@ -2,7 +2,7 @@
 
 use super::pose::Until;
 use super::stated::FARTHEST;
-use crate::calibrate::error::percent;
+use crate::calibrate::percent;
 use crate::error::Variant;
 use palpate_onboard::ModelError;
 

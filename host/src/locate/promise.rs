@@ -6,9 +6,8 @@ use super::pose::{Equivalents, Off, Until};
 use super::world::{Aimed, Drawn, Real, Standing, World};
 use super::write::{Restated, restated};
 use super::{Effort, Hand, Maps, Promised, Seen, TESTED, locating};
-use crate::calibrate::error::Remedy;
-use crate::calibrate::{self, Begin, Chosen, Stop, Tally, Way, choose_groups, margin_of, odds_of};
-use crate::error::{CalibrateProblem, Error, Result};
+use crate::calibrate::{self, Begin, Chosen, Stop, Way, choose_groups, choose_independent, margin_of, odds_of};
+use crate::error::{Error, Result};
 use crate::evaluate::Finding;
 use crate::evidence::{self, Follower, Given, Limit, Outcome, Sequence, Totals};
 use crate::probe::approach::Probe;
@@ -217,7 +216,8 @@ pub struct OfObject {
 ///
 /// # Errors
 /// [`LocateProblem`] for maps without a hand, objects that they do not know, and places that never become sure;
-/// [`CalibrateProblem`](crate::error::CalibrateProblem) if no threshold keeps the promise.
+/// [`Kind::NotKept`](crate::error::Kind::NotKept) or [`Kind::TooFew`](crate::error::Kind::TooFew) if no threshold keeps the
+/// promise.
 pub fn calibrate(
     maps: Maps<'_>,
     standing: &[Standing],
@@ -246,16 +246,13 @@ pub fn calibrate(
     let bytes = restated(maps, &stated)?;
     let sequences = follow(opened(&bytes)?, standing, probe, terms, strictest(terms), progress)?;
     let way = Way { starts: &starts, loosest: None };
-    let chosen =
-        calibrate::chosen(&sequences, &super::names(&maps), &way, &terms.promise, None).map_err(|mut problem| {
-            if let CalibrateProblem::NotKept { wrong, given, remedy, .. } = &mut problem {
-                let both = [super::stated(&maps), terms.real].map(|real| real.noise(probe.speed).to_string());
-                let noise = (both[0] != both[1]).then_some(both);
-                let tally = Tally { wrong: *wrong, all: *given };
-                *remedy = Some(Box::new(Remedy::new(tally, &terms.promise, None, sequences.len(), noise)));
-            }
-            problem
-        })?;
+    let names = super::names(&maps);
+    let chosen = choose_independent(&sequences, names.len(), &way, &terms.promise).map_err(|stop| {
+        let both = [super::stated(&maps), terms.real].map(|real| real.noise(probe.speed).to_string());
+        let noise = (both[0] != both[1]).then_some(both);
+        let tested = calibrate::Tested { supplied: None, sequences: sequences.len(), noise };
+        tested.problem(&stop, &names, &terms.promise)
+    })?;
     let calibrated = promised(maps, &chosen, probe, terms, stated, None)?;
     let again = |leaves_out: bool| {
         let how = (chosen.odds.strictest(), 1, leaves_out);
@@ -322,14 +319,11 @@ pub fn calibrate_recorded(
     let count = pools.len();
     progress.begin("recordings", Some(count as u64));
     let sequences = pools.into_par_iter().map(of).collect::<Result<Vec<_>>>()?.concat();
-    let calibrate::Terms { rate, .. } = terms.promise;
+    let rate = terms.promise.rate;
     let way = Way { starts: &[strictest(terms)], loosest: None };
     let chosen = choose_groups(&[], &sequences, names.len(), &way, &terms.promise).map_err(|stop| match stop {
-        Stop::TooMany { tally: Tally { wrong, all }, needed, .. } => {
-            CalibrateProblem::NotKept { object: None, rate, wrong, given: all, needed, remedy: None }.into()
-        }
         Stop::TooFew { found, needed, .. } => Error::from(LocateProblem::FewRecordings { rate, found, needed }),
-        Stop::Looser => CalibrateProblem::Looser { rate }.into(),
+        _ => stop.problem(rate, "names given").fix("Promise a higher error rate, or record more."),
     })?;
     promised(maps, &chosen, probe, terms, plain, Some(count))
 }

@@ -20,12 +20,11 @@
 use super::{Settings, Tested, calibrate, tested_means, without};
 use crate::calibrate::{self, Start, add_noise, begin, calibrate_from, odds_of};
 use crate::compile::{self, Restated, restate};
-use crate::error::{CalibrateProblem, Result};
+use crate::error::{Kind, Result};
 use crate::mesh::BACKGROUND;
 use crate::progress::Progress;
 use crate::touches::folds::split;
 use crate::touches::{Dataset, ObjectTouches};
-use palpate_base::wording::two_digits;
 use palpate_onboard::{Model, Stopping};
 use palpate_shared::format::Tag;
 
@@ -74,16 +73,9 @@ pub fn calibrate_with_promise(
         if promise.noise.is_none() { shapes.to_vec() } else { shapes.iter().map(noisy).collect() };
     let begun = compile::open(&begun)?;
     let tested = calibrate(&begun, &learned, &shapes, settings)?;
-    let start = Start { margin: strictest, loosest: without.map(|without| without.odds) };
-    let promised = calibrate_from(&compile::open(&tested.bytes)?, halves.test, promise, Some(start), progress);
-    let promised = promised.map_err(|error| {
-        let Some(mut problem) = error.problem::<CalibrateProblem>().cloned() else { return error };
-        if let CalibrateProblem::NotKept { remedy: Some(remedy), .. } = &mut problem {
-            // Touches in all, since only a part of them makes the names of the promise.
-            remedy.touches = remedy.touches.map(|touches| two_digits(touches as f64 / PROMISED));
-        }
-        problem.into()
-    })?;
+    let loosest = without.map(|without| without.odds);
+    let start = Start { margin: strictest, loosest, share: PROMISED };
+    let promised = calibrate_from(&compile::open(&tested.bytes)?, halves.test, promise, Some(start), progress)?;
     let [mean_touches, mean_touches_without] = tested_means(&compile::open(&promised.model)?, &learned, settings)?;
     let tested = Tested { bytes: promised.model.clone(), mean_touches, mean_touches_without, ..tested };
     Ok((promised, tested))
@@ -93,9 +85,7 @@ pub fn calibrate_with_promise(
 fn without_test(calibrated: Result<calibrate::Calibrated>) -> Result<Option<calibrate::Calibrated>> {
     match calibrated {
         Ok(calibrated) => Ok(Some(calibrated)),
-        Err(error) => match error.problem() {
-            Some(CalibrateProblem::TooFew { .. } | CalibrateProblem::NotKept { .. }) => Ok(None),
-            _ => Err(error),
-        },
+        Err(error) if matches!(error.kind(), Kind::TooFew | Kind::NotKept) => Ok(None),
+        Err(error) => Err(error),
     }
 }

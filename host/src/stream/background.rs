@@ -1,11 +1,11 @@
 //! A test of whether rows fit any class that the model knows, with a false alarm rate that is kept on sequences.
 
 use super::Rows;
-use super::parts::Parts;
+use super::parts::{Parts, what};
 use super::settings::StrangerTest;
-use crate::calibrate::{Found, needed, odds_of};
+use crate::calibrate::{Found, needed, odds_of, percent};
 use crate::compile::{self, Restated, restate};
-use crate::error::{CalibrateProblem, Error, Kind, Result};
+use crate::error::{Error, Kind, Result, problem};
 use crate::strangers::{self, Pools};
 use palpate_shared::format::Tag;
 use palpate_trees::rows::RowSequence;
@@ -63,13 +63,23 @@ pub(super) fn test<'s>(
 fn problem(error: Error, parts: &Parts<'_>, settings: &strangers::Settings) -> Error {
     let strangers::Settings { alarms, confidence, .. } = *settings;
     match *error.kind() {
-        Kind::TooManyAlarms { sequences } => CalibrateProblem::TooManyAlarms { found: sequences, alarms }.into(),
+        Kind::TooManyAlarms { sequences } => {
+            let alarms = percent(alarms);
+            problem!(
+                "of the {sequences} sequences that test for strangers more than {alarms} % end as unknown at every threshold"
+            )
+            .fix("Train the model on rows like these, so that they fit their classes, or calibrate without the test.")
+        }
         Kind::TooFew => {
             // Three quarters of the part that is for the test are tested on.
             let needed = needed(alarms, confidence) as f64 / (0.75 * TESTED * parts.share_tested());
             let needed = needed.ceil() as u64;
-            CalibrateProblem::TooFewForTest { found: parts.units as u64, needed, alarms, groups: parts.has_groups }
-                .into()
+            let (found, what, alarms) = (parts.units, what(parts.has_groups), percent(alarms));
+            problem!(
+                "{found} {what} are too few for a test of strangers with at most {alarms} % false alarms: at least {needed} are \
+                 needed, as a part of them tests it"
+            )
+            .fix("Record more, or calibrate without the test.")
         }
         _ => error,
     }

@@ -12,7 +12,7 @@ use crate::calibrate::{
     choose_independent, share_tested,
 };
 use crate::compile::{self, Restated, restate};
-use crate::error::{CalibrateProblem, Result};
+use crate::error::{Result, problem};
 use crate::progress::Progress;
 use palpate_onboard::{Model, Stopping};
 use palpate_shared::format::{PromisedNoise, Tag};
@@ -23,9 +23,10 @@ use palpate_trees::rows::{RowSequence, Sequences};
 /// group are used together, and the promise is then for new groups; without groups they must be independent of each other.
 ///
 /// # Errors
-/// [`CalibrateProblem`], if no threshold keeps the promise, too few names are given to know, or there are too few sequences;
-/// For a model without classes of rows; [`Kind::Setting`](crate::error::Kind::Setting) for
-/// settings out of their ranges.
+/// [`Kind::NotKept`](crate::error::Kind::NotKept) if no threshold keeps the promise;
+/// [`Kind::TooFew`](crate::error::Kind::TooFew) if too few names are given to know, or there are too few sequences; a model
+/// without classes of rows; a class without a sequence; [`Kind::Setting`](crate::error::Kind::Setting) for settings out of
+/// their ranges.
 pub fn calibrate(
     model: &Model<'_>,
     sequences: &Sequences,
@@ -38,7 +39,7 @@ pub fn calibrate(
 /// Like [`calibrate`], with what is learned from sequences of the model's training, so that all other sequences are tested on.
 ///
 /// # Errors
-/// Errors of [`calibrate`]; [`CalibrateProblem::FoldDiffers`] if `learned` is of another model.
+/// Errors of [`calibrate`]; another model than that of `learned`.
 pub fn calibrate_with(
     model: &Model<'_>,
     sequences: &Sequences,
@@ -136,7 +137,10 @@ fn check_classes(model: &Model<'_>, sequences: &[RowSequence]) -> Result<()> {
     let names = names(model).into_iter().enumerate();
     let missing = names.filter(|(class, _)| !sequences.iter().any(|sequence| sequence.class == *class));
     let objects: Vec<String> = missing.map(|(_, name)| name).collect();
-    if objects.is_empty() { Ok(()) } else { Err(CalibrateProblem::MissingSequences { objects }.into()) }
+    match objects.is_empty() {
+        true => Ok(()),
+        false => Err(problem!("there is no sequence of {}", objects.join(", ")).fix("Add sequences of them.")),
+    }
 }
 
 /// Like [`calibrate`], of parts.
@@ -156,13 +160,13 @@ fn calibrate_parts(model: &Model<'_>, rows: &Rows<'_>, parts: Parts<'_>, setting
         let model = compile::open(&shaped)?;
         let loosest = without.as_ref().map(|without| &without.odds);
         let chosen = followed.choose(&model, &parts, &[begin.loosest], loosest);
-        let chosen = chosen.map_err(|stop| parts.problem(stop, &names, settings))?;
+        let chosen = chosen.map_err(|stop| parts.problem(&stop, &names, settings))?;
         let calibrated = finished(&model, &chosen, &parts, settings, max_rows, &fitted)?;
         return Ok(Calibrated { strangers: Some(found), ..calibrated });
     }
     let model = compile::open(&shaped)?;
     let chosen = followed.choose(&model, &parts, &begin.starts, None);
-    let chosen = chosen.map_err(|stop| parts.problem(stop, &names, settings))?;
+    let chosen = chosen.map_err(|stop| parts.problem(&stop, &names, settings))?;
     finished(&model, &chosen, &parts, settings, max_rows, &fitted)
 }
 

@@ -5,7 +5,7 @@ use super::shape::{self, STRICTEST, shaped};
 use super::{Rows, Settings, guard, taken};
 use crate::calibrate::{Limit, Odds, odds_of};
 use crate::compile::{self, Restated, restate};
-use crate::error::{CalibrateProblem, Result};
+use crate::error::{Error, Result, problem};
 use crate::evidence::{Outcome, Totals};
 use palpate_onboard::{Model, Stopping};
 use palpate_shared::format::Tag;
@@ -28,14 +28,14 @@ impl Learned {
     /// Adds a fold, with a model of the same features and classes that was trained without it.
     ///
     /// # Errors
-    /// Errors of [`evaluate`](super::evaluate()); [`CalibrateProblem::FoldDiffers`] for a model with other classes than those before.
+    /// Errors of [`evaluate`](super::evaluate()); a model with other classes than those before.
     pub fn add(&mut self, model: &Model<'_>, fold: &Sequences) -> Result<()> {
         let rows = taken(model, fold)?;
         let margins = Rows::new(model, &rows);
         let all = &mut self.sequences;
         let (features, count) = (fold.features, fold.len() * margins.objects);
         if !self.starts.is_empty() && (all.features != features || self.margins.len() != all.len() * margins.objects) {
-            return Err(CalibrateProblem::FoldDiffers.into());
+            return Err(other_folds());
         }
         all.features = features;
         self.starts.push(all.sequences.len());
@@ -50,17 +50,23 @@ impl Learned {
     /// Its margins in the units of the model that was trained on all folds.
     ///
     /// # Errors
-    /// [`CalibrateProblem::FoldDiffers`] for a model with other features or classes.
+    /// A model with other features or classes.
     pub(super) fn units(&self, model: &Model<'_>) -> Result<Vec<i32>> {
         let is_same = self.sequences.features == model.measured_count()
             && self.margins.len() == self.sequences.len() * model.object_count();
         if !is_same {
-            return Err(CalibrateProblem::FoldDiffers.into());
+            return Err(other_folds());
         }
         let most = f64::from(1 << 30);
         let unit = f64::from(model.unit());
         Ok(self.margins.iter().map(|margin| (margin / unit).round().clamp(-most, most) as i32).collect())
     }
+}
+
+/// Folds that do not belong to the model.
+fn other_folds() -> Error {
+    problem!("the folds have other features or classes than the model, or are fewer than two")
+        .fix("Train the model of each fold as the model itself, on sequences of every class.")
 }
 
 /// Moves a sequence behind `rows` other rows and `groups` other groups.
@@ -97,13 +103,13 @@ pub struct Estimated {
 /// of folds depend on each other, and the model itself was tested on nothing.
 ///
 /// # Errors
-/// [`CalibrateProblem::FoldDiffers`] for fewer than two folds, or those of another model; as [`calibrate`](super::calibrate()) for
-/// settings out of their ranges.
+/// Fewer than two folds, or those of another model; errors of [`calibrate`](super::calibrate()) for settings out of their
+/// ranges.
 pub fn estimate(model: &Model<'_>, learned: &Learned, settings: &Settings) -> Result<Estimated> {
     super::check(model)?;
     settings.check()?;
     if learned.starts.len() < 2 {
-        return Err(CalibrateProblem::FoldDiffers.into());
+        return Err(other_folds());
     }
     let rows = Rows::of(model, learned.units(model)?.into());
     let max_rows = settings.max_rows.unwrap_or(Stopping::from_model(model).max_touches());

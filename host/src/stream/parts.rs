@@ -1,8 +1,8 @@
 //! The sequences of a calibration, divided into those that are learned from and those that are tested on.
 
 use super::settings::Settings;
-use crate::calibrate::{Per, Stop, Tally, needed, share_tested};
-use crate::error::{CalibrateProblem, Result};
+use crate::calibrate::{Stop, at_best, needed, share_tested};
+use crate::error::{Error, Result};
 use crate::random::{self, Purpose};
 use palpate_trees::rows::RowSequence;
 use rand::seq::SliceRandom;
@@ -47,7 +47,7 @@ impl<'s> Parts<'s> {
         let units = order.len();
         let least = needed(settings.rate, settings.confidence) as usize;
         if units < least {
-            return Err(Self::too_few(units, least as u64, has_groups, None, settings).into());
+            return Err(too_few(units as u64, least as u64, has_groups, settings));
         }
         // As many as a promise takes are tested on, if there are no more.
         let learned = (units / LEARNED).min(units - least);
@@ -80,7 +80,7 @@ impl<'s> Parts<'s> {
         };
         let (units, least) = (parts.units_tested(), needed(settings.rate, settings.confidence));
         if (units as u64) < least {
-            return Err(Self::too_few(units, least, parts.has_groups, None, settings).into());
+            return Err(too_few(units as u64, least, parts.has_groups, settings));
         }
         Ok(Self {
             #[cfg(feature = "train")]
@@ -120,47 +120,27 @@ impl<'s> Parts<'s> {
         1.0 - 1.0 / LEARNED as f64
     }
 
-    fn too_few(
-        found: usize,
-        needed: u64,
-        groups: bool,
-        object: Option<String>,
-        settings: &Settings,
-    ) -> CalibrateProblem {
-        let Settings { rate, confidence, .. } = *settings;
-        // The rate that as many could promise without an error, rounded up to two digits.
-        let possible = 1.0 - (1.0 - confidence).powf(1.0 / found.max(1) as f64);
-        let digit = 10.0_f64.powf(possible.log10().floor() - 1.0);
-        let possible = Some((possible / digit).ceil() * digit).filter(|rate| *rate < 0.5);
-        let found = found as u64;
-        CalibrateProblem::TooFewSequences { found, needed, rate, possible, groups, object, names_in: None }
-    }
-
     /// The problem that a walk ended with.
-    pub(super) fn problem(&self, stop: Stop, names: &[String], settings: &Settings) -> CalibrateProblem {
-        let of = |position: usize| (settings.per != Per::Average).then(|| names.get(position).cloned()).flatten();
+    pub(super) fn problem(&self, stop: &Stop, names: &[String], settings: &Settings) -> Error {
         // Thresholds by name are learned on some of them.
         let share = if self.has_groups { 1.0 } else { share_tested(settings.per) };
         let units = (share * self.units_tested() as f64).round() as u64;
-        match stop {
-            Stop::TooFew { position, found, needed } => {
-                let count = usize::try_from(found).unwrap_or(usize::MAX);
-                let mut problem = Self::too_few(count, needed, self.has_groups, of(position), settings);
-                if let CalibrateProblem::TooFewSequences { names_in, .. } = &mut problem {
-                    *names_in = Some(units);
-                }
-                problem
+        let cases = stop.cases("names given", names, settings.per);
+        let cases = match stop {
+            // It is groups that are too few.
+            Stop::TooFew { .. } if self.has_groups => format!("of {units} groups of sequences with {cases}"),
+            _ => format!("{cases} in {units} {}", what(self.has_groups)),
+        };
+        let problem = stop.problem(settings.rate, &cases);
+        match *stop {
+            Stop::TooFew { found, .. } => problem.fix(more(found, self.has_groups, settings)),
+            Stop::TooMany { .. } if stop.is_too_few(settings.rate) => {
+                problem.fix("Record more sequences, or promise a higher error rate.")
             }
-            Stop::TooMany { position, tally: Tally { wrong, all }, needed } => CalibrateProblem::NotKeptByRows {
-                object: of(position),
-                rate: settings.rate,
-                wrong,
-                given: all,
-                needed,
-                units,
-                groups: self.has_groups,
-            },
-            Stop::Looser => CalibrateProblem::Looser { rate: settings.rate },
+            Stop::TooMany { .. } => problem.fix(
+                "Promise a higher error rate, give sequences of more rows, or train the model on rows like these.",
+            ),
+            Stop::Looser => problem.fix("Calibrate on more, or without the test."),
         }
     }
 
@@ -170,4 +150,24 @@ impl<'s> Parts<'s> {
         let mut seen = BTreeSet::new();
         sequences.iter().copied().filter(|sequence| sequence.group.is_none_or(|group| seen.insert(group))).collect()
     }
+}
+
+pub(super) fn what(groups: bool) -> &'static str {
+    if groups { "groups of sequences" } else { "sequences" }
+}
+
+/// So many sequences, or groups, are too few even if no name is wrong.
+fn too_few(found: u64, needed: u64, groups: bool, settings: &Settings) -> Error {
+    let stop = Stop::TooFew { position: 0, found, needed };
+    stop.problem(settings.rate, what(groups)).fix(more(found, groups, settings))
+}
+
+/// What to do about so few names, sequences or groups.
+fn more(found: u64, groups: bool, settings: &Settings) -> String {
+    let at_best = at_best(found, settings.confidence);
+    let more = match groups {
+        true => "groups, or promise a higher error rate; more sequences of the same groups do not help.",
+        false => "sequences, or promise a higher error rate.",
+    };
+    format!("As many support {at_best}. Record more {more}")
 }

@@ -2,7 +2,7 @@
 
 use super::{LEAST, Settings};
 use crate::ensemble::{Ensemble, Output, OverTouches, StatedProbe, TouchOrigin};
-use crate::error::{Error, Result, TeachProblem};
+use crate::error::{Error, Result, problem};
 use crate::evaluate::{Candidate, OfTouches};
 use crate::mesh::BACKGROUND;
 use crate::probe::noise::Noise;
@@ -21,7 +21,7 @@ pub(super) fn check(
     none_missing(ensemble, known)?;
     let is_known = |object: &&ObjectTouches| !Candidate::Full(ensemble).outputs_of(&object.name).is_empty();
     if let Some(object) = recorded.objects.iter().find(is_known) {
-        return Err(TeachProblem::Known { object: object.name.clone() }.into());
+        return Err(is_known_already(&object.name));
     }
     names(ensemble, recorded)?;
     comparable(ensemble, descriptor, known, recorded)?;
@@ -32,9 +32,14 @@ pub(super) fn check(
 fn of_vectors(ensemble: &Ensemble, settings: &Settings) -> Result<Descriptor> {
     self::settings(settings)?;
     ensemble.check()?;
-    let descriptor = ensemble.descriptor().ok_or(TeachProblem::NotOfTouches)?;
+    let descriptor = ensemble.descriptor().ok_or_else(|| {
+        problem!("objects are taught by touches, and the ensemble is over rows of features")
+            .fix("Give an ensemble that was trained on touches.")
+    })?;
     if ensemble.trees.iter().any(|tree| tree.output != Output::Each) {
-        return Err(TeachProblem::OneValue.into());
+        let what = "a leaf of the ensemble holds one value, so that no object can be added to its trees";
+        let fix = "Train with leaves that hold a value for each object, as the preset compact does.";
+        return Err(Error::new(what).fix(fix));
     }
     Ok(descriptor)
 }
@@ -43,7 +48,11 @@ fn of_vectors(ensemble: &Ensemble, settings: &Settings) -> Result<Descriptor> {
 fn none_missing(ensemble: &Ensemble, known: &Dataset) -> Result<()> {
     let has_touches = |name: &&String| known.objects.iter().any(|object| object.name == **name && !object.is_empty());
     let missing: Vec<String> = ensemble.objects.iter().filter(|name| !has_touches(name)).cloned().collect();
-    if missing.is_empty() { Ok(()) } else { Err(TeachProblem::Missing { objects: missing }.into()) }
+    if missing.is_empty() {
+        return Ok(());
+    }
+    Err(problem!("there are no touches of {}, which the ensemble knows", missing.join(", "))
+        .fix("Give the data set that the ensemble was trained on, or another one of the same objects."))
 }
 
 /// Recorded touches that may be compared with the simulated ones.
@@ -57,10 +66,11 @@ fn comparable(ensemble: &Ensemble, descriptor: Descriptor, known: &Dataset, reco
 /// Names that the ensemble, with the recorded objects, can have.
 fn names(ensemble: &Ensemble, recorded: &Dataset) -> Result<()> {
     if recorded.objects.is_empty() {
-        return Err(TeachProblem::Nothing.into());
+        let none = problem!("there are no recorded touches");
+        return Err(none.fix("Record approaches to the object, one line per approach."));
     }
     if recorded.objects.iter().any(|object| object.name == BACKGROUND) {
-        return Err(TeachProblem::Known { object: BACKGROUND.into() }.into());
+        return Err(is_known_already(BACKGROUND));
     }
     let names: Vec<String> = ensemble.objects.iter().cloned().chain(recorded.names()).collect();
     crate::ensemble::check_names(&names)?;
@@ -68,6 +78,12 @@ fn names(ensemble: &Ensemble, recorded: &Dataset) -> Result<()> {
         return Err(crate::ensemble::train::too_many_objects(names.len()));
     }
     Ok(())
+}
+
+fn is_known_already(object: &str) -> Error {
+    problem!("{object} is known already: a taught object needs a name that no other object has").fix(
+        "Fit the probe to recordings of objects that it knows, or rename the recording to teach it as another object.",
+    )
 }
 
 /// Checks that both sides have the same probe, if they state one, and the same stroke.
@@ -78,11 +94,19 @@ fn same_probe(stated: Option<StatedProbe>, longest: u32, recorded: &Dataset) -> 
 
 /// Partial touches are evidence only where every approach was recorded.
 pub(super) fn approaches(counted: Counted, recorded: &Dataset) -> Result<()> {
-    match counted {
-        Counted::Full => Ok(()),
-        Counted::Contacts | Counted::All if recorded.holds_approaches() => Ok(()),
-        Counted::Contacts | Counted::All => Err(TeachProblem::FullTouches { counted }.into()),
+    let evidence = match counted {
+        Counted::Full => return Ok(()),
+        Counted::Contacts => "every touch with a contact",
+        Counted::All => "every approach",
+    };
+    if recorded.holds_approaches() {
+        return Ok(());
     }
+    let full = problem!(
+        "only full touches were recorded, but the model takes {evidence} as evidence: it would learn that the objects never \
+         cause other touches"
+    );
+    Err(full.fix("Record every approach, also those that missed a finger, or train on full touches."))
 }
 
 /// Every touch has a pose, if the descriptor needs one.
@@ -90,7 +114,9 @@ pub(super) fn poses(descriptor: Descriptor, recorded: &Dataset) -> Result<()> {
     let without = |object: &&ObjectTouches| object.touches().iter().any(|touch| touch.pose().is_none());
     match recorded.objects.iter().find(without) {
         Some(object) if descriptor.needs_pose() => {
-            Err(TeachProblem::NoPose { object: object.name.clone(), descriptor }.into())
+            let (object, descriptor) = (&object.name, descriptor.name());
+            Err(problem!("touches of {object} have no pose, which the descriptor {descriptor} needs")
+                .fix("Record the pose with every touch, or train without."))
         }
         _ => Ok(()),
     }
@@ -100,7 +126,9 @@ pub(super) fn poses(descriptor: Descriptor, recorded: &Dataset) -> Result<()> {
 pub(super) fn enough(recorded: &Dataset, evidence: &[usize]) -> Result<()> {
     match recorded.objects.iter().zip(evidence).find(|(_, touches)| **touches < LEAST) {
         Some((object, &touches)) => {
-            Err(TeachProblem::TooFew { object: object.name.clone(), touches, least: LEAST }.into())
+            let object = &object.name;
+            Err(problem!("only {touches} recorded touches of {object} are evidence, and at least {LEAST} are needed")
+                .fix("Record more approaches; 300 are a good start."))
         }
         None => Ok(()),
     }
@@ -113,7 +141,10 @@ pub(super) fn missing_noise(ensemble: &Ensemble, known: &Dataset) -> Result<Nois
         _ if there == stated => Ok(Noise::default()),
         _ if there.is_none() => Ok(stated),
         // What was added to noise that was there is not stated.
-        _ => Err(TeachProblem::OtherNoise { stated: stated.to_string(), there: there.to_string() }.into()),
+        _ => {
+            Err(problem!("the ensemble was trained for {stated}, and the touches of its objects have {there} already")
+                .fix("Give simulated touches without noise, or train again on these."))
+        }
     }
 }
 

@@ -13,7 +13,6 @@ mod alone;
 mod balance;
 mod check;
 mod column;
-pub(crate) mod error;
 mod held_out;
 mod rows;
 #[cfg(test)]
@@ -133,9 +132,8 @@ pub struct TaughtObject {
 /// Beside outputs that are placements, an object has one output, or one for each placement that its recordings name.
 ///
 /// # Errors
-/// [`TeachProblem`](crate::error::TeachProblem) if the ensemble has leaves of one value or is not over touches, if a name
-/// is known already, if touches are missing or too few, have no pose, or are not every approach;
-/// probes that differ;
+/// An ensemble with leaves of one value, or one that is not over touches; a name that is known already; touches that are
+/// missing or too few, have no pose, or are not every approach; probes that differ;
 /// [`Kind::Setting`](crate::error::Kind::Setting); [`Kind::Cancelled`](crate::error::Kind::Cancelled).
 pub fn teach(
     ensemble: &Ensemble,

@@ -114,12 +114,7 @@ fn calibrated(dataset: Dataset, per: Per, seed: u64) -> calibrate::Calibrated {
 
 /// The promise; none where no threshold keeps the rate on these touches, which is said and breaks nothing.
 fn promised<T>(calibrated: Result<T>) -> Option<T> {
-    calibrated
-        .map_err(|error| match error.problem() {
-            Some(CalibrateProblem::NotKept { .. }) => {}
-            _ => panic!("{error}"),
-        })
-        .ok()
+    calibrated.map_err(|error| assert!(matches!(error.kind(), Kind::NotKept | Kind::TooFew), "{error}")).ok()
 }
 
 /// Promises of `calibrate` and of `calibrate --strangers`, repeated: `PALPATE_REPETITIONS=40 cargo test --release -p palpate --test

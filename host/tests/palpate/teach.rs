@@ -3,7 +3,6 @@ use crate::synthetic::{self, few_trees, to_teach};
 use palpate::compile::{self, compile};
 use palpate::ensemble::train::{train, train_with_background};
 use palpate::ensemble::{self, compiled_trained_on};
-use palpate::error::TeachProblem;
 use palpate::mesh::BACKGROUND;
 use palpate::teach::{Settings, alone, teach};
 
@@ -86,12 +85,13 @@ fn a_background_stays_the_last_and_is_no_name() {
     assert_eq!(extended.known_count(), 3);
     // Without the background's touches there is nothing to compare with.
     let error = teach(&ensemble, &known, &recorded, &few_groups(), &()).unwrap_err();
-    let missing = TeachProblem::Missing { objects: vec![BACKGROUND.into()] };
-    assert_eq!(error.problem(), Some(&missing));
+    assert_eq!(error.what(), format!("there are no touches of {BACKGROUND}, which the ensemble knows"));
 }
 
-fn problem(ensemble: &Ensemble, known: &Dataset, recorded: &Dataset) -> TeachProblem {
-    teach(ensemble, known, recorded, &few_groups(), &()).unwrap_err().problem::<TeachProblem>().cloned().unwrap()
+/// Asserts that recorded objects cannot be taught, for this reason.
+fn refused(ensemble: &Ensemble, known: &Dataset, recorded: &Dataset, reason: &str) {
+    let error = teach(ensemble, known, recorded, &few_groups(), &()).unwrap_err();
+    assert!(error.what().starts_with(reason), "{error}");
 }
 
 #[test]
@@ -99,22 +99,21 @@ fn what_cannot_be_taught_says_why() {
     let [known, recorded, _] = to_teach(60);
     let ensemble = &*TRAINED;
     let one_value = train(&known, &with!(few_trees(), multi_output = false), &()).unwrap();
-    assert_eq!(problem(&one_value, &known, &recorded), TeachProblem::OneValue);
+    refused(&one_value, &known, &recorded, "a leaf of the ensemble holds one value");
     let mut renamed = recorded.clone();
     renamed.objects[0].name = "object1".into();
-    assert_eq!(problem(ensemble, &known, &renamed), TeachProblem::Known { object: "object1".into() });
+    refused(ensemble, &known, &renamed, "object1 is known already");
     let first = known.only(|name| name == "object0");
-    let missing = TeachProblem::Missing { objects: vec!["object1".into()] };
-    assert_eq!(problem(ensemble, &first, &recorded), missing);
-    assert_eq!(problem(ensemble, &known, &Dataset::default()), TeachProblem::Nothing);
+    refused(ensemble, &first, &recorded, "there are no touches of object1, which the ensemble knows");
+    refused(ensemble, &known, &Dataset::default(), "there are no recorded touches");
     let mut few = recorded.clone();
     few.objects[0] = few.objects[0].select(0..19);
-    let too_few = TeachProblem::TooFew { object: "object2".into(), touches: 19, least: 20 };
-    assert_eq!(problem(ensemble, &known, &few), too_few);
+    let too_few = "only 19 recorded touches of object2 are evidence, and at least 20 are needed";
+    refused(ensemble, &known, &few, too_few);
     let mut full = recorded.clone();
     full.objects[0] = filtered(&full.objects[0], Touch::is_full);
-    let counted = Counted::Contacts;
-    assert_eq!(problem(ensemble, &known, &full), TeachProblem::FullTouches { counted });
+    let only_full = "only full touches were recorded, but the model takes every touch with a contact as evidence";
+    refused(ensemble, &known, &full, only_full);
     let groups = with!(few_groups(), groups = 0);
     let error = teach(ensemble, &known, &recorded, &groups, &()).unwrap_err();
     assert_eq!(error.exit_code(), 2);
@@ -136,8 +135,9 @@ fn another_probe_and_a_missing_pose_are_refused() {
     let settings = with!(few_trees(), descriptor = Descriptor::Oriented);
     let probe = StatedProbe::of(&known);
     let ensemble = train(&known, &with!(settings, probe), &()).unwrap();
-    let no_pose = TeachProblem::NoPose { object: "object2".into(), descriptor: Descriptor::ContactsOriented };
-    assert_eq!(problem(&ensemble, &known, &recorded), no_pose);
+    let descriptor = Descriptor::ContactsOriented.name();
+    let no_pose = format!("touches of object2 have no pose, which the descriptor {descriptor} needs");
+    refused(&ensemble, &known, &recorded, &no_pose);
     with_pose(&mut recorded);
     teach(&ensemble, &known, &recorded, &few_groups(), &()).unwrap();
     recorded.origin = origin(2.0);

@@ -12,7 +12,7 @@ use palpate::Result;
 use palpate::calibrate::{self, Calibrated, Gain, Guarded, OfRecorded, OfRows, Per, Settings, Terms, Used};
 use palpate::compile::{self, CompiledModel};
 use palpate::ensemble::compiled_trained_on;
-use palpate::error::{CalibrateProblem, Error, Place};
+use palpate::error::{Error, Kind, Place, problem};
 use palpate::output;
 use palpate::probe::noise::Noise;
 use palpate::strangers;
@@ -206,8 +206,7 @@ fn on_touches(arguments: &Arguments, directory: &PathBuf, global: &Global) -> Re
         super::remark(&format!("palpate: note: {unlike}"));
     }
     let wrong = |error: palpate::Error| {
-        use CalibrateProblem::{MissingRecordings, NotSupported};
-        let is_of_recorded = matches!(error.problem(), Some(NotSupported { .. } | MissingRecordings { .. }));
+        let is_of_recorded = matches!(error.kind(), Kind::NotKept | Kind::NotRecorded | Kind::TooFew);
         error.in_file(arguments.recorded.as_ref().filter(|_| is_of_recorded).unwrap_or(directory))
     };
     if !arguments.strangers.is_wanted() {
@@ -272,8 +271,12 @@ fn untrained(compiled: &CompiledModel, directory: &PathBuf) -> Result<Dataset> {
     if trained_on.is_empty() {
         return Ok(dataset);
     }
-    let objects = trained_on.into_iter().map(String::from).collect();
-    Err(Error::variant_at(Place::file(directory), CalibrateProblem::TrainedOn { objects }))
+    let objects = trained_on.join(", ");
+    let what = problem!(
+        "the model was trained on these touches of {objects}: a promise calibrated on them would not hold for others"
+    );
+    let fix = "Calibrate on others: capture them with another seed (--seed), or record more.";
+    Err(what.fix(fix).at(Place::file(directory)))
 }
 
 fn text(path: &Path, calibrated: &Calibrated, placements: &str) -> String {

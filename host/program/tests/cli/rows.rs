@@ -567,7 +567,7 @@ fn what_cannot_be_promised_of_sequences_of_rows_is_refused_with_what_to_do() {
     let at = &three_classes("xgboost-3.4-softprob.ubj");
     succeeds(at, &format!("export {} -o value.palpate", data("xgboost-2.1-squarederror.ubj")));
     let good = &sequences(at, 240, 0);
-    let few = "240 sequences are too few to promise 1 %: at least 299 are needed … as many could promise 1.3 %";
+    let few = "240 sequences are too few to promise 1 %: at least 299 are needed … As many support 1.3 % at best";
     let all = "model.palpate --sequence-column id";
     for (text, more, code, expected) in [
         (good.clone(), all, 1, few),

@@ -41,6 +41,13 @@ fn whole(title: &str, styles: &[&str], scripts: &str, body: &Markup) -> String {
     .into_string()
 }
 
+/// Data for the page's scripts, as the element `data`.
+pub(crate) fn data(value: &serde_json::Value) -> Markup {
+    // In a script element only `<` could end the data early.
+    let text = value.to_string().replace('<', "\\u003c");
+    html! { script id="data" type="application/json" { (PreEscaped(text)) } }
+}
+
 /// Makes tables that are wider than their place say so: for elements of the class `scroll`, and the style of `more`.
 pub(crate) const HINT: &str = include_str!("hint.js");
 

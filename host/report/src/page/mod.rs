@@ -10,11 +10,8 @@ pub(crate) mod axis;
 pub(crate) mod chart;
 pub(crate) mod color;
 pub mod document;
-mod error;
 pub(crate) mod heat_map;
 pub(crate) mod html;
 pub mod render;
 pub(crate) mod scene;
 pub mod table;
-
-pub use error::PageProblem;

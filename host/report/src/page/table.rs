@@ -1,7 +1,7 @@
 //! Tables: shown in the page with columns that sort, and written as CSV.
 
 use super::axis::number;
-use crate::page::PageProblem;
+use crate::bug;
 use palpate::error::Result;
 
 /// One cell.
@@ -111,23 +111,23 @@ impl Records {
         let spread: Vec<bool> = (0..self.columns.len())
             .map(|c| self.rows.iter().any(|row| matches!(row[c], Cell::Spread(..) | Cell::PercentSpread(..))))
             .collect();
-        let bug = |reason: String| PageProblem::Csv { reason };
+        let refused = |error: &dyn std::error::Error| bug(format!("cannot write CSV: {error}"));
         let mut writer = csv::Writer::from_writer(Vec::new());
         let header = self
             .columns
             .iter()
             .zip(&spread)
             .flat_map(|(name, &spread)| std::iter::once(name.clone()).chain(spread.then(|| format!("{name} ±"))));
-        writer.write_record(header).map_err(|e| bug(e.to_string()))?;
+        writer.write_record(header).map_err(|error| refused(&error))?;
         for row in &self.rows {
             let fields = row.iter().zip(&spread).flat_map(|(cell, &spread)| {
                 let mut fields = cell.fields();
                 fields.resize(1 + usize::from(spread), String::new());
                 fields
             });
-            writer.write_record(fields).map_err(|e| bug(e.to_string()))?;
+            writer.write_record(fields).map_err(|error| refused(&error))?;
         }
-        Ok(writer.into_inner().map_err(|e| bug(e.to_string()))?)
+        writer.into_inner().map_err(|error| refused(&error))
     }
 }
 

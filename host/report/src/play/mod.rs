@@ -10,7 +10,6 @@ mod table;
 pub use surfaces::{Surface, surfaces};
 pub use table::{MOST_OBJECTS, table};
 
-use crate::page::PageProblem;
 use crate::page::html;
 use crate::page::scene;
 use crate::run_page::models;
@@ -114,10 +113,10 @@ fn about(model: &Model<'_>) -> Result<String> {
 /// Errors of [`surfaces()`].
 pub fn page(objects: &[Object], contenders: &[Contender], settings: &Settings) -> Result<String> {
     let surfaces = surfaces(objects, &settings.origin)?;
-    let json = data(&surfaces, contenders, settings)?;
+    let data = data(&surfaces, contenders, settings);
     let body = html! {
         (body(&surfaces, contenders, settings))
-        script id="data" type="application/json" { (maud::PreEscaped(json)) }
+        (html::data(&data))
         (scene::stage())
         (html::script(include_str!("game.js")))
         (html::script(include_str!("picture.js")))
@@ -127,10 +126,10 @@ pub fn page(objects: &[Object], contenders: &[Contender], settings: &Settings) -
     Ok(html::file_with_wasm("Touch it yourself – Palpate", &[scene::STYLE, include_str!("page.css")], &body))
 }
 
-/// Data for the page's script, safe inside a script element.
-fn data(surfaces: &[Surface], contenders: &[Contender], settings: &Settings) -> Result<String> {
+/// Data for the page's script.
+fn data(surfaces: &[Surface], contenders: &[Contender], settings: &Settings) -> serde_json::Value {
     let Settings { origin, noise, .. } = settings;
-    let data = serde_json::json!({
+    serde_json::json!({
         "wasm": STANDARD.encode(WASM),
         "millimeters": origin.unit == Length::Millimeter,
         "aim": Aim::ALL.iter().position(|aim| *aim == origin.aim),
@@ -148,15 +147,7 @@ fn data(surfaces: &[Surface], contenders: &[Contender], settings: &Settings) -> 
             "known": contender.model.model().known_count(),
             "plan": contender.model.model().plan().is_some(),
         })).collect::<Vec<_>>(),
-    });
-    safe(&data)
-}
-
-/// Data as text that is safe inside a script element.
-fn safe(data: &serde_json::Value) -> Result<String> {
-    let text = serde_json::to_string(data).map_err(|error| PageProblem::Scene { reason: error.to_string() })?;
-    // In a script element only `<` could end the data early.
-    Ok(text.replace('<', "\\u003c"))
+    })
 }
 
 fn body(surfaces: &[Surface], contenders: &[Contender], settings: &Settings) -> Markup {

@@ -1,6 +1,6 @@
 //! A page on which a hand comes straight down on a table, and a locator recognizes what lies there, and where.
 
-use super::{Settings, WASM, safe, surfaces};
+use super::{Settings, WASM, surfaces};
 use crate::page::{html, scene};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -61,7 +61,7 @@ pub fn table(objects: &[Object], settings: &Settings, progress: &dyn Progress) -
             })).collect::<Vec<_>>(),
         }))
     };
-    let json = safe(&serde_json::json!({
+    let data = serde_json::json!({
         "wasm": STANDARD.encode(WASM),
         "millimeters": true,
         "aim": 0,
@@ -73,10 +73,10 @@ pub fn table(objects: &[Object], settings: &Settings, progress: &dyn Progress) -
         "real": [real.height, real.position, real.lost, real.drift, real.drift_yaw],
         "threshold": 1.0 - maps.error_rate,
         "reach": 2.0 * maps.range,
-    }))?;
+    });
     let body = html! {
         (body(&surfaces, &origin, &maps, bytes.len(), learned.len(), &settings.command))
-        script id="data" type="application/json" { (maud::PreEscaped(json)) }
+        (html::data(&data))
         (scene::stage())
         (html::script(include_str!("game.js")))
         (html::script(include_str!("picture.js")))

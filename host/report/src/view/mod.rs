@@ -87,8 +87,8 @@ pub fn page(object: &Object, settings: &Settings) -> Result<String> {
     let lines = drawn.approaches.iter().enumerate().flat_map(|(group, approach)| approach.lines(group));
     let [low, high] = scene.bounds().map(|corner| corner.to_array());
     let scene = scene::Scene { mesh, low, high, radius: settings.probe.radius, lines: lines.collect() };
-    let json = scene.json(own.as_object().cloned().unwrap_or_default())?;
-    Ok(html(object, settings, &facts, lying.as_ref(), shown_triangles, &drawn, &json))
+    let data = scene.data(own.as_object().cloned().unwrap_or_default());
+    Ok(html(object, settings, &facts, lying.as_ref(), shown_triangles, &drawn, &data))
 }
 
 /// An object on a table: its placements.
@@ -223,7 +223,7 @@ fn html(
     lying: Option<&Lying>,
     shown_triangles: usize,
     drawn: &Approaches,
-    json: &str,
+    data: &serde_json::Value,
 ) -> String {
     let side = facts.high - facts.low;
     let unit = f64::from(side.max_element()) / settings.length;
@@ -301,7 +301,7 @@ fn html(
                 }
             }
         }
-        (scene::scripts(json, include_str!("page.js")))
+        (scene::scripts(data, include_str!("page.js")))
     };
     html::file(&format!("{} – Palpate", object.name), &[include_str!("page.css"), scene::STYLE], &body)
 }

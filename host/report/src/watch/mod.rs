@@ -5,7 +5,6 @@
 //! lines of Rust that the program does ([`palpate_shared::link`], compiled to WebAssembly by `host/web/link`). Names and
 //! posteriors come from the chip. With a model the page also draws that model's thresholds, and says if the chip has another.
 
-use crate::page::PageProblem;
 use crate::page::html;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -28,11 +27,9 @@ pub fn page(model: Option<&CompiledModel>, command: &str) -> Result<String> {
         return Err(raw_features());
     }
     let data = serde_json::json!({ "wasm": STANDARD.encode(WASM), "model": model.map(stated) });
-    let text = serde_json::to_string(&data).map_err(|error| PageProblem::Scene { reason: error.to_string() })?;
     let body = html! {
         (body(model.is_some(), command))
-        // In a script element only `<` could end the data early.
-        script id="data" type="application/json" { (maud::PreEscaped(text.replace('<', "\\u003c"))) }
+        (html::data(&data))
         (html::script(include_str!("link.js")))
         (html::script(include_str!("port.js")))
         (html::script(include_str!("page.js")))

@@ -11,11 +11,10 @@ fn fresh(count: usize, seed: u64) -> Dataset {
     synthetic::dataset(&[count; OBJECTS], seed)
 }
 
-fn problem<T>(result: palpate::Result<T>) -> CalibrateProblem {
-    match result.err().unwrap().problem() {
-        Some(problem) => CalibrateProblem::clone(problem),
-        other => panic!("{other:?}"),
-    }
+/// Asserts that a promise is refused, for a reason with these parts.
+fn assert_refused<T>(result: palpate::Result<T>, kind: &Kind, parts: &[&str]) {
+    let error = result.err().unwrap();
+    assert!(error.is(kind) && parts.iter().all(|part| error.what().contains(part)), "{error}");
 }
 
 /// Places of made-up objects; the first two are hard to distinguish.
@@ -183,22 +182,30 @@ fn thresholds_by_name_are_learned_on_other_sequences_than_they_are_tested_on() {
     // confused nothing is promised, instead of something stricter.
     let mut confused = sequences;
     confused[4_000..].iter_mut().step_by(9).for_each(|sequence| sequence.object = (sequence.object + 1) % 4);
-    let problem = problem(choose(&confused, &names(4), 10.0, &terms(0.05, Per::Name)));
-    assert!(matches!(problem, CalibrateProblem::NotKept { object: Some(_), .. }), "{problem:?}");
+    let chosen = choose(&confused, &names(4), 10.0, &terms(0.05, Per::Name));
+    assert_refused(chosen, &Kind::NotKept, &["names given for object"]);
 }
 
 #[test]
 fn too_few_sequences_promise_nothing_and_say_how_many_it_takes() {
     let sequences = walks(400, 1);
     assert!(choose(&sequences, &names(4), 10.0, &terms(0.05, Per::Average)).is_ok());
-    let few = problem(choose(&sequences, &names(4), 10.0, &terms(0.001, Per::Average)));
-    assert!(matches!(few, CalibrateProblem::TooFew { object: None, needed: 2_995, found: 399..=400, .. }), "{few:?}");
-    let few = problem(choose(&sequences, &names(4), 10.0, &terms(0.02, Per::Object)));
-    assert!(matches!(few, CalibrateProblem::TooFew { object: Some(_), needed: 149, found: 100, .. }), "{few:?}");
-    assert!(matches!(
-        problem(choose(&[], &names(4), 10.0, &terms(0.1, Per::Average))),
-        CalibrateProblem::TooFew { found: 0, .. }
-    ));
+    let few = |sequences, rate, per, parts: &[&str]| {
+        assert_refused(choose(sequences, &names(4), 10.0, &terms(rate, per)), &Kind::TooFew, parts);
+    };
+    few(
+        &sequences[..],
+        0.001,
+        Per::Average,
+        &["names given are too few to promise 0.1 %: at least 2995 are needed, none"],
+    );
+    few(
+        &sequences[..],
+        0.02,
+        Per::Object,
+        &["100 names given for object", " 2 %: at least 149 are needed, none of them"],
+    );
+    few(&[], 0.1, Per::Average, &["0 names given are too few"]);
 }
 
 #[test]
@@ -206,8 +213,12 @@ fn a_model_that_is_wrong_however_sure_it_is_keeps_no_promise() {
     let mut sequences = walks(2_000, 1);
     // Every twentieth is of another object than it seems.
     sequences.iter_mut().step_by(20).for_each(|sequence| sequence.object = (sequence.object + 1) % 4);
-    let problem = problem(choose(&sequences, &names(4), 10.0, &terms(0.01, Per::Average)));
-    assert!(matches!(problem, CalibrateProblem::NotKept { wrong: 90..=110, given: 1_800..=2_000, .. }), "{problem:?}");
+    let chosen = choose(&sequences, &names(4), 10.0, &terms(0.01, Per::Average));
+    assert_refused(
+        chosen,
+        &Kind::NotKept,
+        &["no threshold that was tested keeps 1 %: at the best ", "names given are wrong"],
+    );
 }
 
 #[test]
@@ -293,8 +304,8 @@ fn what_cannot_be_calibrated_says_so() {
     assert!(few.exit_code() == 1 && few.to_string().contains("too few to promise 1 %: at least 299"), "{few}");
     assert!(few.to_string().contains(" approaches of each object or more; there are 100 of one"), "{few}");
     let less = synthetic::dataset(&[100, 100], 2);
-    let missing = problem(calibrate(&MODEL.model(), less, &Settings::default(), &()));
-    assert_eq!(missing, CalibrateProblem::Missing { objects: vec!["object2".into()] });
+    let missing = calibrate(&MODEL.model(), less, &Settings::default(), &());
+    assert_refused(missing, &Kind::Input, &["the data set has no touches of object2"]);
     let more = synthetic::dataset(&[100; 4], 2);
     assert!(calibrate(&MODEL.model(), more, &Settings::default(), &()).is_err());
 }

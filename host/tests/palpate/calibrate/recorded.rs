@@ -21,11 +21,19 @@ fn settings(rate: f64) -> Settings {
     with!(Settings::default(), rate, sequences = 6_000, max_touches = Some(200))
 }
 
-fn not_supported(result: palpate::Result<Calibrated>) -> (CalibrateProblem, String) {
+/// The refusal of recordings that are too few for a promise.
+fn too_few(result: palpate::Result<Calibrated>) -> String {
     let error = result.unwrap_err();
-    let problem = error.problem::<CalibrateProblem>().cloned().unwrap();
-    assert!(matches!(problem, CalibrateProblem::NotSupported { .. }), "{problem:?}");
-    (problem, error.to_string())
+    assert!(error.is(&Kind::TooFew), "{error}");
+    error.to_string()
+}
+
+/// The text between two others.
+fn between<'t>(text: &'t str, before: &str, after: &str) -> &'t str {
+    text.split_once(before)
+        .and_then(|(_, rest)| rest.split_once(after))
+        .unwrap_or_else(|| panic!("{before}…{after}: {text}"))
+        .0
 }
 
 /// The share of wrong names among those that a model gives to touches of a robot.
@@ -94,25 +102,29 @@ fn recordings_that_are_too_few_say_which_rate_they_support_and_that_rate_can_be_
     let of = |count: usize, rate: f64| {
         calibrate_recorded(&MODEL.model(), SIMULATED.clone(), &recorded_as_simulated(count), &settings(rate), &())
     };
-    let (problem, text) = not_supported(of(300, 0.01));
-    let CalibrateProblem::NotSupported { tally, needed, forecast, object, .. } = problem else { unreachable!() };
-    assert!(tally.all < 299 && tally.wrong == 0 && needed == 299 && object.is_none(), "{text}");
-    assert!(text.contains("are too few to promise 1 %: at least 299 are needed"), "{text}");
-    let (supported, enough) = (forecast.supported.unwrap(), forecast.enough.unwrap());
+    let text = too_few(of(300, 0.01));
     assert!(
-        text.contains(&format!("300 recorded approaches to each object support about {} %", 100.0 * supported)),
+        text.contains("names given on the recordings are too few to promise 1 %: at least 299 are needed"),
         "{text}"
     );
-    assert!(text.contains(&format!("1 % takes about {} in all, from {} to", enough.all, enough.least.0)), "{text}");
-    let most = enough.most.0;
+    let supported = between(&text, "300 recorded approaches to each object support about ", " %");
+    let supported = supported.parse::<f64>().unwrap() / 100.0;
+    // "2400 in all, from 700 to object2 to 900 to object0"
+    let enough = between(&text, "1 % takes about ", ", if the simulation is right");
+    let (all, each) = enough.split_once(" in all, from ").unwrap();
+    let words: Vec<&str> = each.split(" to ").collect();
+    let &[least, easy, most, hard] = &words[..] else { panic!("{text}") };
+    let [all, least, most] = [all, least, most].map(|number| number.parse::<usize>().unwrap());
     assert!((0.015..0.4).contains(&supported) && (400..6_000).contains(&most), "{text}");
-    assert!(enough.least.0 < most && enough.all < OBJECTS as u64 * most, "{text}");
+    assert!(least < most && all < OBJECTS * most, "{text}");
     of(300, supported).unwrap();
     // As many of each object as it takes.
-    let counts = [&enough.least, &enough.most].map(|(count, name)| (name.clone(), *count as usize));
-    let rest = enough.all as usize - counts.iter().map(|(_, count)| count).sum::<usize>();
-    let as_much = |object: &ObjectTouches| counts.iter().find(|of| of.0 == object.name).map_or(rest, |of| of.1);
-    let recorded = recorded_as_simulated(most as usize).each(|object| object.select(0..as_much(object)));
+    let as_much = |object: &ObjectTouches| match &object.name {
+        name if name == easy => least,
+        name if name == hard => most,
+        _ => all - least - most,
+    };
+    let recorded = recorded_as_simulated(most).each(|object| object.select(0..as_much(object)));
     calibrate_recorded(&MODEL.model(), SIMULATED.clone(), &recorded, &settings(0.01), &()).unwrap();
 }
 

@@ -6,7 +6,7 @@
 use super::layout::{Anchor, Layout, NARROW, SAMPLE, Text};
 use super::parts::{Chart, Key, Mark, Shape, Stroke, Svg};
 use super::text::SIZE;
-use crate::page::PageProblem;
+use crate::bug;
 use crate::page::axis::Axis;
 use crate::page::color::{GRAY, GRID};
 use maud::html;
@@ -47,7 +47,7 @@ impl Chart {
             let root = SVGBackend::with_string(&mut text, size).into_drawing_area();
             self.draw(&root, layout)
                 .and_then(|()| root.present().map_err(|e| e.to_string()))
-                .map_err(|reason| PageProblem::Chart { title: self.title.clone(), reason })?;
+                .map_err(|reason| bug(format!("cannot draw the chart \"{}\": {reason}", self.title)))?;
         }
         let written: String = layout.texts.iter().map(written).collect();
         let text = text.replacen("</svg>", &format!("{written}</svg>"), 1);

@@ -2,7 +2,7 @@
 //! ball at their end.
 //!
 //! [three.js](https://threejs.org) draws it, from inside the page. `stage.js` sets it up, for any page; `scene.js` offers
-//! the page's own script one function, `drawScene(data, { hover, choose })`: it draws what [`Scene::json`] wrote, calls
+//! the page's own script one function, `drawScene(data, { hover, choose })`: it draws what [`Scene::data`] wrote, calls
 //! back with the group of the line under the pointer, and returns `show`, which takes what is visible.
 
 mod simplified;
@@ -10,11 +10,9 @@ mod simplified;
 pub(crate) use simplified::SimplifiedMesh;
 
 use super::html;
-use crate::page::PageProblem;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, html};
-use palpate::error::Result;
 
 #[cfg(test)]
 pub(crate) use simplified::MOST_TRIANGLES;
@@ -57,11 +55,8 @@ pub(crate) struct Line {
 }
 
 impl Scene {
-    /// The scene as JSON for `drawScene`, with other fields for the page's own script; safe inside a script element.
-    ///
-    /// # Errors
-    /// [`PageProblem::Scene`].
-    pub(crate) fn json(&self, own: serde_json::Map<String, serde_json::Value>) -> Result<String> {
+    /// The scene as data for `drawScene`, with other fields for the page's own script.
+    pub(crate) fn data(&self, own: serde_json::Map<String, serde_json::Value>) -> serde_json::Value {
         let mesh = &self.mesh;
         let mut data = serde_json::json!({
             "radius": self.radius,
@@ -77,9 +72,7 @@ impl Scene {
         if let Some(fields) = data.as_object_mut() {
             fields.extend(own);
         }
-        let text = serde_json::to_string(&data).map_err(|error| PageProblem::Scene { reason: error.to_string() })?;
-        // In a script element only `<` could end the data early.
-        Ok(text.replace('<', "\\u003c"))
+        data
     }
 }
 
@@ -101,10 +94,10 @@ pub(crate) fn stage() -> Markup {
     }
 }
 
-/// The scripts that draw `json`, which [`Scene::json`] wrote, and then the page's `own` script.
-pub(crate) fn scripts(json: &str, own: &str) -> Markup {
+/// The scripts that draw `data`, which [`Scene::data`] gave, and then the page's `own` script.
+pub(crate) fn scripts(data: &serde_json::Value, own: &str) -> Markup {
     html! {
-        script id="data" type="application/json" { (maud::PreEscaped(json)) }
+        (html::data(data))
         (stage())
         (html::script(include_str!("scene.js")))
         (html::script(own))
