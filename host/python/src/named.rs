@@ -1,8 +1,7 @@
 //! Descriptors and noise, as Python names them.
 
-use crate::failure::Failure;
 use palpate::error::Error;
-use palpate::probe::noise::{Noise, quantity};
+use palpate::probe::noise::Noise;
 use palpate::shared::Descriptor;
 
 /// The descriptor with this name.
@@ -11,14 +10,11 @@ pub(crate) fn descriptor_of(name: &str) -> palpate::Result<Descriptor> {
     Descriptor::from_name(name).ok_or_else(|| Error::setting("descriptor", name, format!("one of {}", all())))
 }
 
-/// Noise as users write it.
-pub(crate) fn noise_of(deviation: &str, timer: &str) -> Result<Noise, Failure> {
+/// Noise as users write it: the settings that are not empty.
+pub(crate) fn noise_of(deviation: &str, timer: &str) -> palpate::Result<Noise> {
     let mut noise = Noise::default();
-    if !deviation.is_empty() {
-        noise.deviation = deviation.parse()?;
-    }
-    if !timer.is_empty() {
-        noise.timer = quantity::duration(timer)?;
+    for (key, text) in [("noise", deviation), ("timer", timer)].into_iter().filter(|(_, text)| !text.is_empty()) {
+        noise.set(key, text)?;
     }
     Ok(noise)
 }

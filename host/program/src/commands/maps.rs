@@ -4,7 +4,8 @@ use super::Global;
 use super::keys::pairs;
 use palpate::locate::{self, Maps, Real, Settings, Surface};
 use palpate::output;
-use palpate::probe::noise::{Noise, quantity};
+use palpate::probe::noise::Noise;
+use palpate::probe::noise::quantity::{ANGLE, LENGTH, SHARE};
 use palpate::touches::Dataset;
 use palpate::with;
 use palpate::wording::{count, decimal, percent};
@@ -57,20 +58,19 @@ impl FromStr for MapSettings {
 
 impl MapSettings {
     fn set(&mut self, key: &str, value: &str) -> Option<()> {
-        let length = |text: &str| quantity::length(text).ok();
         match key {
             "cell" => {
-                let cell = length(value)?;
+                let cell = LENGTH.read(value)?;
                 self.fine = [(1_000.0, true), (2_000.0, false)].into_iter().find(|own| own.0 == cell).map(|own| own.1);
                 self.fine?;
             }
-            "range" => self.range = Some(length(value)?),
-            "noise" => self.noise = Some(length(value)?),
-            "lost" => self.lost = Some(quantity::share(value).ok()?),
-            "position" => self.position = Some(length(value)?),
+            "range" => self.range = Some(LENGTH.read(value)?),
+            "noise" => self.noise = Some(LENGTH.read(value)?),
+            "lost" => self.lost = Some(SHARE.read(value)?),
+            "position" => self.position = Some(LENGTH.read(value)?),
             _ => {
                 let (moved, turned) = value.split_once('/')?;
-                self.drift = Some([length(moved)?, quantity::angle(turned).ok()?]);
+                self.drift = Some([LENGTH.read(moved)?, ANGLE.read(turned)?]);
             }
         }
         Some(())

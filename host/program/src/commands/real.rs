@@ -3,7 +3,7 @@
 use super::keys::nearest;
 use palpate::error::{Kind, Place, problem};
 use palpate::probe::file::ProbeFile;
-use palpate::probe::noise::{Noise, PartialNoise};
+use palpate::probe::noise::{Noise, PartialNoise, keys};
 use palpate::{Error, Result};
 use std::path::{Path, PathBuf};
 
@@ -24,7 +24,7 @@ struct Real {
 
 #[derive(Clone, Debug)]
 enum Given {
-    Settings(Box<PartialNoise>),
+    Settings(PartialNoise),
     File(PathBuf),
 }
 
@@ -48,7 +48,7 @@ impl RealArguments {
     pub(crate) fn on_table(&self, base: Noise) -> Result<Noise> {
         let noise = match self.real.as_ref().map(|real| &real.given) {
             None => base,
-            Some(Given::Settings(settings)) => (**settings).over(base),
+            Some(Given::Settings(settings)) => settings.over(base),
             Some(Given::File(path)) => ProbeFile::read(path)?.real,
         };
         match self.real.as_ref().map(|real| &real.given) {
@@ -75,7 +75,7 @@ fn real(text: &str) -> Result<Real, String> {
     let is_file = path.extension().is_some_and(|extension| extension == "toml") || path.is_file();
     let given = match is_file {
         true => Given::File(path.into()),
-        false => Given::Settings(Box::new(text.parse().map_err(wrong)?)),
+        false => Given::Settings(text.parse().map_err(wrong)?),
     };
     Ok(Real { text: text.into(), given })
 }
@@ -83,9 +83,7 @@ fn real(text: &str) -> Result<Real, String> {
 /// A problem with the settings, with the key that may have been meant.
 fn wrong(error: Error) -> String {
     let nearest = match error.kind() {
-        Kind::Setting { name: "real", value, .. } => {
-            nearest(value.split('=').next().unwrap_or_default(), &PartialNoise::KEYS)
-        }
+        Kind::Setting { name: "real", value, .. } => nearest(value.split('=').next().unwrap_or_default(), &keys()),
         _ => String::new(),
     };
     format!("{error}{nearest}")

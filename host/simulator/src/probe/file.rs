@@ -30,11 +30,15 @@
 
 use crate::error::{Error, Place, Result, problem};
 use crate::probe::approach::{FINGERS, Probe};
-use crate::probe::noise::{Deviation, Grazing, Noise, quantity};
+use crate::probe::noise::quantity::ANGLE;
+use crate::probe::noise::{self, Grazing, Noise};
 use palpate_shared::format::Length;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
+use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::Path;
+use toml::{Spanned, Value};
 
 /// Contents of a probe file.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,36 +64,9 @@ struct Document {
     stroke: Option<f64>,
     stroke_tolerance: Option<f64>,
     travel: Option<f64>,
-    #[serde(default, deserialize_with = "duration")]
-    timer: Option<f64>,
+    timer: Option<Spanned<Value>>,
     #[serde(default)]
-    real: Real,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-struct Real {
-    speed_factor: Option<f64>,
-    offsets: [f64; FINGERS],
-    #[serde(deserialize_with = "deviation")]
-    noise: Option<Deviation>,
-    #[serde(deserialize_with = "duration")]
-    timer: Option<f64>,
-    #[serde(deserialize_with = "duration")]
-    debounce: Option<f64>,
-    #[serde(deserialize_with = "shares")]
-    missed: [f64; FINGERS],
-    #[serde(deserialize_with = "share")]
-    speed_error: Option<f64>,
-    #[serde(deserialize_with = "share")]
-    speed_bias: Option<f64>,
-    #[serde(deserialize_with = "angle")]
-    pose_noise: Option<f64>,
-    #[serde(deserialize_with = "angle")]
-    pose_bias: Option<f64>,
-    #[serde(deserialize_with = "length")]
-    position: Option<f64>,
-    grazing: Option<Aside>,
+    real: BTreeMap<String, Spanned<Value>>,
 }
 
 #[derive(Clone, Copy, Deserialize)]
@@ -117,15 +94,23 @@ impl ProbeFile {
     /// # Errors
     /// Errors of [`read`](Self::read).
     pub fn parse(text: &str, path: &Path) -> Result<Self> {
-        let document: Document = toml::from_str(text).map_err(|error| {
-            let before = error.span().and_then(|span| text.get(..span.start));
+        let unusable = |error: &toml::de::Error, span: Option<Range<usize>>| {
+            let before = span.and_then(|span| text.get(..span.start));
             let place = match before {
                 Some(before) => Place::line(path, 1 + before.matches('\n').count() as u64),
                 None => Place::file(path),
             };
             Self::unusable(error.message()).at(place)
-        })?;
-        let file = Self::of(&document);
+        };
+        let document: Document = toml::from_str(text).map_err(|error| unusable(&error, error.span()))?;
+        let Document { unit, radius, spacing, speed, tilt, stroke, stroke_tolerance, travel, timer, real } = document;
+        let mut noise = Noise::default();
+        for (key, value) in timer.map(|timer| ("timer".into(), timer)).into_iter().chain(real) {
+            let span = value.span();
+            take(&mut noise, speed, &key, value.into_inner()).map_err(|error| unusable(&error, Some(span)))?;
+        }
+        let probe = Probe { radius, spacing, speed, tilt, stroke, travel, stroke_tolerance };
+        let file = Self { probe, unit, real: noise };
         let length = match file.unit {
             Length::Tenth => 10.0,
             Length::Millimeter => 1.0,
@@ -140,85 +125,44 @@ impl ProbeFile {
             "Give unit (\"unit\" or \"mm\"), radius, spacing, speed, and optionally tilt, stroke, travel, timer and [real].",
         )
     }
-
-    fn of(document: &Document) -> Self {
-        let Document { unit, radius, spacing, speed, tilt, stroke, stroke_tolerance, travel, timer, ref real } =
-            *document;
-        let real = Noise {
-            deviation: real.noise.unwrap_or_default(),
-            timer: real.timer.or(timer).unwrap_or_default(),
-            debounce: real.debounce.unwrap_or_default(),
-            missed: real.missed,
-            // A finger that stands out by a length touches earlier by the time that the probe takes for it.
-            bent: real.offsets.map(|offset| offset / speed * 1e6),
-            speed: real.speed_factor.unwrap_or(1.0),
-            speed_error: real.speed_error.unwrap_or_default(),
-            speed_bias: real.speed_bias.unwrap_or_default(),
-            pose: real.pose_noise.unwrap_or_default(),
-            pose_bias: real.pose_bias.unwrap_or_default(),
-            position: real.position.unwrap_or_default(),
-            drift: [0.0; 2],
-            // Lengths become the times that the probe takes for them.
-            grazing: real.grazing.map_or_else(Grazing::default, |Aside { angle, bend }| Grazing {
-                angle: angle.unwrap_or_default(),
-                bend: bend / speed * 1e6,
-            }),
-        };
-        Self { probe: Probe { radius, spacing, speed, tilt, stroke, travel, stroke_tolerance }, unit, real }
-    }
 }
 
 fn tilt() -> f64 {
     Probe::default().tilt
 }
 
-/// A quantity that is written as text with its unit.
-fn read<'de, D: Deserializer<'de>, T>(
-    deserializer: D,
-    parse: impl Fn(&str) -> Result<T>,
-) -> Result<Option<T>, D::Error> {
-    let text = String::deserialize(deserializer)?;
-    parse(&text).map(Some).map_err(D::Error::custom)
-}
-
-fn duration<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
-    read(deserializer, quantity::duration)
-}
-
-fn deviation<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Deviation>, D::Error> {
-    read(deserializer, str::parse)
-}
-
-fn share<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
-    read(deserializer, quantity::share)
-}
-
-/// A share of all fingers' contacts, or one of each finger's.
-fn shares<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f64; FINGERS], D::Error> {
-    #[derive(Deserialize)]
-    #[serde(untagged)]
-    enum Shares {
-        One(String),
-        Each([String; FINGERS]),
-    }
-    let given = Shares::deserialize(deserializer).map_err(|_| {
-        D::Error::custom("missed is a share such as \"2%\", or one of each finger: [\"1%\", \"2%\", \"0%\"]")
-    })?;
-    let texts = match given {
-        Shares::One(text) => std::array::from_fn(|_| text.clone()),
-        Shares::Each(texts) => texts,
-    };
-    let mut shares = [0.0; FINGERS];
-    for (share, text) in shares.iter_mut().zip(texts) {
-        *share = quantity::share(&text).map_err(D::Error::custom)?;
-    }
-    Ok(shares)
-}
-
-fn length<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
-    read(deserializer, quantity::length)
-}
-
 fn angle<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
-    read(deserializer, quantity::angle)
+    ANGLE.parse(&String::deserialize(deserializer)?).map(Some).map_err(D::Error::custom)
+}
+
+/// Takes the setting of a key under `[real]`, of a probe with this nominal speed.
+fn take(noise: &mut Noise, speed: f64, key: &str, value: Value) -> std::result::Result<(), toml::de::Error> {
+    // A file states how far fingers stand out as `offsets`, and objects move only on a simulated table.
+    let known = noise::keys().into_iter().filter(|key| !["bent", "drift"].contains(key));
+    let known: Vec<&str> = known.chain(["offsets", "grazing"]).collect();
+    if !known.contains(&key) {
+        let known = known.join("`, `");
+        return Err(toml::de::Error::custom(format!("unknown field `{key}`, expected one of `{known}`")));
+    }
+    // Lengths become the times that the probe takes for them.
+    let micros = |length: f64| length / speed * 1e6;
+    let text = match (key, value) {
+        ("offsets", value) => {
+            // A finger that stands out touches earlier.
+            noise.bent = value.try_into::<[f64; FINGERS]>()?.map(micros);
+            return Ok(());
+        }
+        ("grazing", value) => {
+            let Aside { angle, bend } = value.try_into()?;
+            noise.grazing = Grazing { angle: angle.unwrap_or_default(), bend: micros(bend) };
+            return Ok(());
+        }
+        ("speed_factor", value) => value.try_into::<f64>()?.to_string(),
+        ("missed", value @ Value::Array(_)) => {
+            let example = "missed is a share such as \"2%\", or one of each finger: [\"1%\", \"2%\", \"0%\"]";
+            value.try_into::<[String; FINGERS]>().map_err(|_| toml::de::Error::custom(example))?.join("/")
+        }
+        (_, value) => value.try_into()?,
+    };
+    noise.set(key, &text).map_err(toml::de::Error::custom)
 }

@@ -6,52 +6,84 @@ fn read(text: &str) -> PartialNoise {
 
 #[test]
 fn every_key_sets_its_own_setting_and_leaves_the_others_open() {
-    let deviation = Deviation { least: 0.0, largest: 5_000.0 };
+    let none = Noise::default();
+    let all = "noise=1..2ms,timer=3ms,debounce=4ms,missed=5%,bent=6ms,speed_factor=0.7,speed_error=8%,speed_bias=9%,\
+               pose_noise=10deg,pose_bias=11deg,position=12mm,drift=13mm/14deg";
+    let range = Deviation { least: 0.0, largest: 5_000.0 };
     for (text, expected) in [
-        ("noise=0..5ms", PartialNoise { deviation: Some(deviation), ..PartialNoise::default() }),
-        ("noise=5ms", PartialNoise { deviation: Some(5_000.0.into()), ..PartialNoise::default() }),
-        ("timer=1ms", PartialNoise { timer: Some(1_000.0), ..PartialNoise::default() }),
-        ("timer=0.005 s", PartialNoise { timer: Some(5_000.0), ..PartialNoise::default() }),
-        ("debounce=300us", PartialNoise { debounce: Some(300.0), ..PartialNoise::default() }),
-        ("missed=2%", PartialNoise { missed: Some([0.02; 3]), ..PartialNoise::default() }),
-        ("missed=2 %", PartialNoise { missed: Some([0.02; 3]), ..PartialNoise::default() }),
-        ("missed=1%/0.02/0%", PartialNoise { missed: Some([0.01, 0.02, 0.0]), ..PartialNoise::default() }),
-        ("bent=3ms/0ms/-500us", PartialNoise { bent: Some([3_000.0, 0.0, -500.0]), ..PartialNoise::default() }),
-        ("speed_factor=0.98", PartialNoise { speed: Some(0.98), ..PartialNoise::default() }),
-        ("speed_error=5%", PartialNoise { speed_error: Some(0.05), ..PartialNoise::default() }),
-        ("speed-bias=0.1", PartialNoise { speed_bias: Some(0.1), ..PartialNoise::default() }),
-        ("pose-noise=5deg", PartialNoise { pose: Some(5.0), ..PartialNoise::default() }),
-        ("drift=1mm/0.5deg", PartialNoise { drift: Some([1_000.0, 0.5]), ..PartialNoise::default() }),
-        ("position=0.5mm", PartialNoise { position: Some(500.0), ..PartialNoise::default() }),
-        ("position=300um", PartialNoise { position: Some(300.0), ..PartialNoise::default() }),
-        (" pose_bias = 1.5° ", PartialNoise { pose_bias: Some(1.5), ..PartialNoise::default() }),
+        ("noise=0..5ms", with!(none; deviation: range)),
+        ("noise=5ms", with!(none; deviation: 5_000.0.into())),
+        ("timer=1ms", with!(none; timer: 1_000.0)),
+        ("timer=0.005 s", with!(none; timer: 5_000.0)),
+        ("debounce=300us", with!(none; debounce: 300.0)),
+        ("missed=2%", with!(none; missed: [0.02; 3])),
+        ("missed=2 %", with!(none; missed: [0.02; 3])),
+        ("missed=1%/0.02/0%", with!(none; missed: [0.01, 0.02, 0.0])),
+        ("bent=3ms/0ms/-500us", with!(none; bent: [3_000.0, 0.0, -500.0])),
+        ("speed_factor=0.98", with!(none; speed: 0.98)),
+        ("speed_error=5%", with!(none; speed_error: 0.05)),
+        ("speed-bias=0.1", with!(none; speed_bias: 0.1)),
+        ("pose-noise=5deg", with!(none; pose: 5.0)),
+        ("drift=1mm/0.5deg", with!(none; drift: [1_000.0, 0.5])),
+        ("position=0.5mm", with!(none; position: 500.0)),
+        ("position=300um", with!(none; position: 300.0)),
+        (" pose_bias = 1.5° ", with!(none; pose_bias: 1.5)),
     ] {
-        assert_eq!(read(text), expected, "{text}");
+        assert_eq!(read(text).over(none), expected, "{text}");
+        let over = read(text).over(read(all).over(none)).settings();
+        let changed: Vec<&str> = over.split(',').filter(|setting| !all.contains(setting)).collect();
+        let key = text.split('=').next().unwrap().trim().replace('-', "_");
+        assert!(changed.len() == 1 && changed[0].starts_with(&key), "{over}");
     }
-    assert_eq!(read("none"), Noise::default().into());
-    assert_eq!(read("none,missed=2%").over(Noise::switch()), with!(Noise::default(); missed: [0.02; 3]));
+    assert_eq!(read("none").over(Noise::switch()), none);
+    assert_eq!(read("none,missed=2%").over(Noise::switch()), with!(none; missed: [0.02; 3]));
     assert_eq!(read("timer=0ms").over(Noise::switch()), with!(Noise::switch(); timer: 0.0));
+}
+
+#[test]
+fn a_setting_is_taken_by_its_key_and_refused_with_an_example() {
+    let mut noise = Noise::default();
+    noise.set("noise", "0..5ms").unwrap();
+    noise.set("timer", "1ms").unwrap();
+    assert_eq!(noise, Noise::switch());
+    let error = noise.set("timer", "5").unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "\"5\" is not a quantity with its unit. Give a duration such as 5ms, 300us or 0.005s."
+    );
+    assert!(noise.set("jitter", "5ms").unwrap_err().to_string().contains("one of noise, timer"));
 }
 
 #[test]
 fn what_is_written_reads_as_the_same_to_the_last_bit() {
     for text in [
-        "noise=0ms..5ms,timer=1ms,debounce=2ms,missed=2%,bent=3ms/0ms/-0.5ms,speed_factor=0.98",
+        "noise=0..5ms,timer=1ms,debounce=2ms,missed=2%,bent=3ms/0ms/-0.5ms,speed_factor=0.98",
         "speed_error=5%,speed_bias=10%,pose_noise=5deg,pose_bias=1.5deg,position=0.3mm,drift=1mm/1deg",
+        "noise=2.5ms,pose_noise=5deg",
         "none",
-        "none,timer=1ms",
         "missed=1%/2%/0%",
     ] {
-        assert_eq!(read(text).to_string(), text);
+        assert_eq!(read(text).over(Noise::default()).settings(), text);
     }
     let mut random = palpate_simulator::random::generator(1, palpate_simulator::random::Purpose::Noise, "text", 0);
     for _ in 0..200 {
         use rand::RngExt;
         let mut number = || random.random::<f64>();
         let noise = with!(Noise::default(); deviation: Deviation { least: 100.0 * number(), largest: 100.0 + 9e3 * number() }, timer: 1e4 * number(), debounce: number(), missed: [number(), number(), number()], bent: [-1e3 * number(), number(), 0.0], speed: 0.5 + number(), speed_error: 0.9 * number(), speed_bias: 0.9 * number(), pose: 180.0 * number(), pose_bias: number(), position: 1e4 * number(), drift: [1e3 * number(), number()], grazing: Grazing::default());
-        let given = PartialNoise::from(noise);
-        assert_eq!(read(&given.to_string()), given, "{given}");
+        assert_eq!(read(&noise.settings()).over(Noise::default()), noise, "{}", noise.settings());
     }
+}
+
+/// The first words between backquotes of the lines of a table.
+fn first_words(table: &str) -> Vec<&str> {
+    table.lines().filter_map(|line| line.strip_prefix("| `")?.split('`').next()).collect()
+}
+
+#[test]
+fn the_reference_of_options_describes_every_key_in_the_same_order() {
+    let text = std::fs::read_to_string("../../docs/reference/options.md").unwrap();
+    let section = text.split("\n## ").find(|section| section.starts_with("What disturbs touches")).unwrap();
+    assert_eq!(first_words(section), palpate_simulator::probe::noise::keys());
 }
 
 #[test]

@@ -4,11 +4,10 @@
 //! same for all touches of one robot is a bias.
 //!
 //! ```
-//! use palpate_simulator::probe::noise::{Deviation, Noise};
+//! use palpate_simulator::probe::noise::{Deviation, Noise, PartialNoise};
 //! use palpate_shared::Touch;
 //!
-//! let mut noise = Noise::default();
-//! (noise.deviation, noise.timer) = ("0..10ms".parse()?, 1_000.0);
+//! let noise = "noise=0..10ms,timer=1ms".parse::<PartialNoise>()?.over(Noise::default());
 //! let noisy = noise.add("fork", &[Touch::from_micros([0, 12_345, 30_000])], 1);
 //! // The first contact is 0 again, and the timer counts whole milliseconds.
 //! assert!(noisy[0].times().iter().all(|time| time.micros().is_some_and(|micros| micros % 1_000 == 0)));
@@ -19,9 +18,10 @@
 mod grazing;
 mod partial;
 pub mod quantity;
+mod table;
 
 pub use grazing::Grazing;
-pub use partial::PartialNoise;
+pub use partial::{PartialNoise, keys};
 
 use crate::error::{Error, Result};
 use crate::probe::approach::{FINGERS, Probe, to_q15};
@@ -29,11 +29,12 @@ use crate::random::{self, Purpose};
 use glam::DVec3;
 use palpate_shared::format::{PromisedNoise, TrainedNoise};
 use palpate_shared::{ContactTime, Pose, Position, Q15_ONE, Touch};
+use quantity::DURATION;
 use rand::RngExt;
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::fmt;
-use std::str::FromStr;
+use table::ROWS;
 
 /// Noise that is added to touches. Times are in microseconds, angles in degrees, shares between 0 and 1. The default
 /// adds nothing.
@@ -113,64 +114,15 @@ impl From<f64> for Deviation {
     }
 }
 
-/// `5ms`, or a range as `0..10ms`.
-impl FromStr for Deviation {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self> {
-        let problem = || quantity::bad(text, "a duration with its unit such as 5ms, or a range such as 0..10ms");
-        let Some((least, largest)) = text.split_once("..") else {
-            return quantity::duration(text).map(Self::from).map_err(|_| problem());
-        };
-        // The first number may go without a unit: it has that of the second.
-        let unit = largest.trim_start_matches(|c: char| !c.is_ascii_alphabetic());
-        let least = quantity::duration(least).or_else(|_| quantity::duration(&format!("{least}{unit}")));
-        match (least, quantity::duration(largest)) {
-            (Ok(least), Ok(largest)) if least <= largest => Ok(Self { least, largest }),
-            _ => Err(problem()),
-        }
-    }
-}
-
 /// Describes the noise in words: "noise of 0 to 10 ms, a timer of 1 ms".
 impl fmt::Display for Noise {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let ms = |micros: f64| micros / 1e3;
-        let percent = |share: f64| (1e6 * share).round() / 1e4;
-        let Deviation { least, largest } = self.deviation;
-        let mut parts = Vec::new();
-        if largest > 0.0 {
-            let range = if least == largest { String::new() } else { format!("{} to ", ms(least)) };
-            parts.push(format!("noise of {range}{} ms", ms(largest)));
-        }
-        let mut say = |is_there: bool, text: String| parts.extend(is_there.then_some(text));
-        say(self.timer > 0.0, format!("a timer of {} ms", ms(self.timer)));
-        say(self.debounce > 0.0, format!("bouncing of up to {} ms", ms(self.debounce)));
-        let [missed, others @ ..] = self.missed;
-        if others.iter().all(|other| *other == missed) {
-            say(missed > 0.0, format!("{} % of contacts missed", percent(missed)));
-        } else {
-            for (finger, missed) in (1..).zip(self.missed) {
-                say(missed > 0.0, format!("{} % of finger {finger}'s contacts missed", percent(missed)));
-            }
-        }
-        for (finger, early) in (1..).zip(self.bent) {
-            let side = if early > 0.0 { "early" } else { "late" };
-            // Tenths of a millisecond are enough, unless there are fewer.
-            let tenths = (early.abs() / 100.0).round() * 100.0;
-            let shown = if tenths > 0.0 { tenths } else { early.abs() };
-            say(early != 0.0, format!("finger {finger} is {} ms {side}", ms(shown)));
-        }
-        say(self.speed != 1.0, format!("a speed of {} times the nominal one", self.speed));
-        say(self.speed_error > 0.0, format!("speed off by up to {} % per touch", percent(self.speed_error)));
-        say(self.speed_bias > 0.0, format!("speed off by up to {} % per robot", percent(self.speed_bias)));
-        say(self.pose > 0.0, format!("a pose turned by {}° per touch", self.pose));
-        say(self.pose_bias > 0.0, format!("a pose turned by {}° per robot", self.pose_bias));
-        say(self.position > 0.0, format!("a position off by {} mm per touch", self.position / 1e3));
-        let [moved, turned] = self.drift;
-        say(!is_still(&self.drift), format!("an object that moves by {} mm and {turned}° per approach", moved / 1e3));
+        let there = ROWS.iter().filter(|row| row.adds_to(self));
+        let mut parts: Vec<String> = there.flat_map(|row| row.described(self)).collect();
         let Grazing { angle, bend } = self.grazing;
-        say(bend > 0.0, format!("fingers that bend aside by {} ms beyond {angle}°", ms(bend)));
+        if bend > 0.0 {
+            parts.push(format!("fingers that bend aside by {} beyond {angle}°", (DURATION.said)(bend)));
+        }
         f.write_str(&if parts.is_empty() { "no noise".into() } else { parts.join(", ") })
     }
 }
@@ -217,13 +169,7 @@ impl Noise {
 
     /// The noise that a compiled model states that it was trained for.
     pub fn of_training(trained: &TrainedNoise) -> Self {
-        let TrainedNoise { least, largest, timer, pose } = *trained;
-        Self {
-            deviation: Deviation { least: least.into(), largest: largest.into() },
-            timer: timer.into(),
-            pose: f64::from(pose) / 1e3,
-            ..Self::default()
-        }
+        Self::of_promise(&PromisedNoise { touch: *trained, ..PromisedNoise::default() })
     }
 
     /// Statement of a compiled model's promise about it.
@@ -268,45 +214,19 @@ impl Noise {
     /// Refuses noise that cannot be.
     ///
     /// # Errors
-    /// [`Kind::Setting`](crate::error::Kind::Setting) that names the field, `noise` for the deviation.
+    /// [`Kind::Setting`](crate::error::Kind::Setting) that names the key.
     pub fn check(&self) -> Result<()> {
-        let Deviation { least, largest } = self.deviation;
-        if !(0.0 <= least && least <= largest && largest.is_finite()) {
-            let value = if least == largest { least.to_string() } else { format!("{least}..{largest}") };
-            return Err(Error::setting("noise", value, "a duration of at least 0"));
-        }
-        for (name, value) in [("timer", self.timer), ("debounce", self.debounce), ("grazing", self.grazing.bend)] {
-            if !(value >= 0.0 && value.is_finite()) {
-                return Err(Error::setting(name, value, "a duration of at least 0"));
+        for row in &ROWS {
+            if let Some((wrong, allowed)) = row.wrong(&row.of(self)) {
+                return Err(Error::setting(row.key, wrong, allowed));
             }
         }
-        if !(0.0..90.0).contains(&self.grazing.angle) {
-            return Err(Error::setting("grazing", self.grazing.angle, "degrees from 0 to less than 90"));
+        let Grazing { angle, bend } = self.grazing;
+        if !(bend >= 0.0 && bend.is_finite()) {
+            return Err(Error::setting("grazing", bend, "a duration of at least 0"));
         }
-        if let Some(bent) = self.bent.iter().find(|bent| !bent.is_finite()) {
-            return Err(Error::setting("bent", bent, "a duration"));
-        }
-        if let Some(missed) = self.missed.iter().find(|share| !(0.0..=1.0).contains(*share)) {
-            return Err(Error::setting("missed", missed, "a share from 0 to 1"));
-        }
-        if !(self.speed > 0.0 && self.speed.is_finite()) {
-            return Err(Error::setting("speed", self.speed, "a number greater than 0"));
-        }
-        for (name, value) in [("speed_error", self.speed_error), ("speed_bias", self.speed_bias)] {
-            if !(0.0..=0.9).contains(&value) {
-                return Err(Error::setting(name, value, "a share from 0 to 0.9"));
-            }
-        }
-        for (name, value) in [("pose_noise", self.pose), ("pose_bias", self.pose_bias)] {
-            if !(0.0..=180.0).contains(&value) {
-                return Err(Error::setting(name, value, "degrees from 0 to 180"));
-            }
-        }
-        if !(self.position >= 0.0 && self.position.is_finite()) {
-            return Err(Error::setting("position", self.position, "a length of at least 0"));
-        }
-        if let Some(drift) = self.drift.iter().find(|drift| !(**drift >= 0.0 && drift.is_finite())) {
-            return Err(Error::setting("drift", drift, "a length and an angle of at least 0"));
+        if !(0.0..90.0).contains(&angle) {
+            return Err(Error::setting("grazing", angle, "degrees from 0 to less than 90"));
         }
         Ok(())
     }
