@@ -53,7 +53,8 @@ impl fmt::Display for Place {
     }
 }
 
-/// What a caller may act on: Python picks an exception by it, and a program its exit code. Texts are for people alone.
+/// Kinds of problems that a caller may act on: Python picks an exception by them, and a program its exit code. Texts are for
+/// people alone.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Kind {
@@ -218,28 +219,28 @@ impl Error {
         Self::new("standard output was closed").as_kind(Kind::Closed)
     }
 
-    /// The same with this remedy, a sentence.
+    /// Adds the remedy, a sentence.
     #[must_use]
     pub fn fix(mut self, fix: impl Into<String>) -> Self {
         self.0.fix = fix.into();
         self
     }
 
-    /// The same at this place.
+    /// Sets the place.
     #[must_use]
     pub fn at(mut self, place: Place) -> Self {
         self.0.place = place;
         self
     }
 
-    /// The same as a problem of this kind.
+    /// Sets the kind.
     #[must_use]
     pub fn as_kind(mut self, kind: Kind) -> Self {
         self.0.kind = kind;
         self
     }
 
-    /// The same with `part` before what is wrong: "row 3: ".
+    /// Puts `part` before the description: "row 3: ".
     #[must_use]
     pub fn within(mut self, part: impl fmt::Display) -> Self {
         self.0.what.insert_str(0, &part.to_string());
@@ -255,7 +256,7 @@ impl Error {
         }
     }
 
-    /// What a caller may act on.
+    /// The kind, for a caller that acts on it.
     pub fn kind(&self) -> &Kind {
         &self.0.kind
     }
@@ -265,17 +266,17 @@ impl Error {
         self.0.kind == *kind
     }
 
-    /// Where it is.
+    /// The place.
     pub fn place(&self) -> &Place {
         &self.0.place
     }
 
-    /// What is wrong, without place and remedy.
+    /// The description, without place and remedy.
     pub fn what(&self) -> &str {
         &self.0.what
     }
 
-    /// What to do, as a sentence.
+    /// The remedy, as a sentence.
     pub fn remedy(&self) -> &str {
         &self.0.fix
     }

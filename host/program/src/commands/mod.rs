@@ -262,7 +262,8 @@ fn hint(error: &Error, command: &str) -> Option<String> {
         Kind::SameName { first, second }
             if has("instances") && first.parent() != second.parent() && first.file_stem() == second.file_stem() =>
         {
-            "--instances takes each directory as one object, called like the directory."
+            "If each directory is one object, --instances takes it as such, called like the directory. If they hold two versions of \
+             the same parts, such as visual and collision, give one of them."
         }
         _ => return capture::hint(error, &has),
     };
