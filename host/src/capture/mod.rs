@@ -3,7 +3,7 @@
 //! Sample i of an object is a pure function of (seed, object's name, i) ([`Sampler`]), so neither the number of threads
 //! nor a division into [parts](crate::touches::Samples) changes a touch. Producers compute chunks of samples, one writer puts
 //! them on the disk in order, and bounded channels between them keep the memory flat (`pipeline`). The data set's directory
-//! appears as a whole or not at all ([`Folder`]).
+//! appears as a whole or not at all.
 //!
 //! ```
 //! use palpate::capture::{self, capture};
@@ -35,11 +35,10 @@ mod tests;
 use crate::error::{Error, Kind, Place, Result, problem};
 use crate::in_order::in_order;
 use crate::mesh::{Instance, Object, placements};
-use crate::output::Folder;
 use crate::probe::approach::FINGERS;
 use crate::probe::scene::{Scene, Table};
 use crate::progress::{self, Progress};
-use crate::touches::{Entry, Listing, Lying, ObjectTouches, Origin, Source};
+use crate::touches::{Entry, Listing, Lying, ObjectTouches, Origin, Source, Writer};
 use crate::wording::first_ten;
 use palpate_shared::format::Length;
 use rayon::prelude::*;
@@ -147,12 +146,11 @@ pub fn capture(objects: &[Object], settings: &Settings, directory: &Path, progre
         .collect();
     untouched(&samplers, &settings.origin).map_or(Ok(()), Err)?;
     let entries = objects.iter().zip(&scenes).map(|(object, scenes)| entry(object, scenes, &settings.origin)).collect();
-    let mut listing = Listing { objects: entries, ..Listing::new(&settings.origin, []) };
+    let listing = Listing { objects: entries, ..Listing::new(&settings.origin, []) };
     let replaced = replaced(directory, &listing, settings.force)?;
-    let folder = Folder::begin(directory)?;
-    let objects = pipeline::run(&samplers, settings, folder.path(), &mut listing.objects, progress)?;
-    listing.write(folder.path())?;
-    folder.finish(&replaced)?;
+    let mut writer = Writer::begin(directory, listing)?;
+    let objects = pipeline::run(&samplers, settings, &mut writer, progress)?;
+    writer.finish(true, &replaced)?;
     Ok(Summary { objects, seconds: start.elapsed().as_secs_f64() })
 }
 

@@ -5,17 +5,14 @@
 //! ahead waits, so at most a few chunks are in memory regardless of the number of touches.
 
 use super::{ObjectSummary, Sampler, Settings};
-use crate::error::{Error, Place, Result, problem};
+use crate::error::{Error, Result, problem};
 use crate::probe::approach::FINGERS;
 use crate::progress::{self, Progress};
-use crate::touches::{CRC, Entry, write_touch};
+use crate::touches::{Writer, write_touch};
 use crossbeam_channel::{Receiver, Sender, bounded};
 use palpate_shared::ContactPattern;
 use std::fmt::Display;
-use std::fs::File;
-use std::io::{ErrorKind, Write as _};
 use std::ops::Range;
-use std::path::Path;
 use std::time::Instant;
 
 /// Number of samples in a chunk: some milliseconds of work.
@@ -36,12 +33,11 @@ struct Chunk {
     turned_back: u64,
 }
 
-/// Captures all samples of each object into a file of the folder, and lists them in the object's entry.
+/// Captures all samples of each object into its file.
 pub(super) fn run(
     samplers: &[Sampler<'_>],
     settings: &Settings,
-    folder: &Path,
-    entries: &mut [Entry],
+    writer: &mut Writer,
     progress: &dyn Progress,
 ) -> Result<Vec<ObjectSummary>> {
     let samples = settings.origin.samples();
@@ -73,29 +69,21 @@ pub(super) fn run(
         }
         let mut turns = (0..threads).cycle();
         let mut summaries = Vec::with_capacity(samplers.len());
-        for entry in entries {
+        for file in writer.files() {
             let start = Instant::now();
             let (mut late, mut touching, mut turned_back) = ([0; FINGERS], 0, 0);
-            let path = entry.file(folder);
-            let io = |error| not_written(&path, &error);
-            let mut file = File::create(&path).map_err(io)?;
-            let mut digest = CRC.digest();
+            let mut file = file?;
             for part in split(&samples) {
                 let turn = turns.next().unwrap_or(0);
                 let chunk = receive(&channels[turn])?;
                 let touches = part.end - part.start;
-                file.write_all(chunk.text.as_bytes()).map_err(io)?;
-                digest.update(chunk.text.as_bytes());
-                entry.touches += touches;
-                entry.approaches += chunk.approaches;
-                entry.bytes += chunk.text.len() as u64;
+                file.write(&chunk.text, touches, chunk.approaches)?;
                 late.iter_mut().zip(chunk.late).for_each(|(late, more)| *late += more);
                 touching += chunk.touching;
                 turned_back += chunk.turned_back;
                 progress::advance(progress, touches)?;
             }
-            file.sync_all().map_err(io)?;
-            entry.crc32 = Some(digest.finalize());
+            let entry = file.close()?;
             summaries.push(ObjectSummary {
                 name: entry.name.clone(),
                 touches: entry.touches,
@@ -120,14 +108,6 @@ fn split(samples: &Range<u64>) -> impl Iterator<Item = Range<u64>> + Clone + use
 fn chunks(objects: usize, samples: &Range<u64>) -> impl Iterator<Item = (usize, Range<u64>)> + use<> {
     let parts = split(samples);
     (0..objects).flat_map(move |object| parts.clone().map(move |part| (object, part)))
-}
-
-fn not_written(path: &Path, error: &std::io::Error) -> Error {
-    let fix = match error.kind() {
-        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => "Free some space, then repeat the capture.",
-        _ => "Check the disk, then repeat the capture.",
-    };
-    problem!("cannot write the touches: {error}").fix(fix).at(Place::file(path))
 }
 
 /// The problem of an operating system that refuses a thread.

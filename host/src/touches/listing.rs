@@ -103,9 +103,6 @@ impl Listing {
     /// The file's name.
     pub const FILE: &str = "dataset.json";
 
-    /// The touches as the file states them, for messages.
-    pub(super) const STATED: &str = "the touches that dataset.json states";
-
     /// A listing of objects without touches so far.
     pub(crate) fn new(origin: &Origin, names: impl IntoIterator<Item = String>) -> Self {
         Self {
@@ -218,19 +215,6 @@ const FROM_ELSEWHERE: &str = "Remove the file if the touches are from elsewhere,
 
 fn not_a_listing(why: impl Display) -> Error {
     problem!("not the listing of a data set ({why})").fix(FROM_ELSEWHERE)
-}
-
-/// Remedy for a file that differs from what `dataset.json` states.
-const RESTORE: &str = "Restore the file or capture the objects again, or remove dataset.json if this is meant.";
-
-/// The problem of a listed object whose file is not there.
-pub(super) fn missing(name: &str) -> Error {
-    problem!("missing, although dataset.json lists the object {name}").fix(RESTORE)
-}
-
-/// The problem of a file that has another number of touches than listed.
-pub(super) fn other_count(stated: u64, found: u64) -> Error {
-    problem!("{found} touches where dataset.json states {stated}").fix(RESTORE)
 }
 
 #[cfg(test)]

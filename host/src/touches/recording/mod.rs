@@ -10,17 +10,17 @@ mod tests;
 
 use super::alike::other_position;
 use super::checksum::CRC;
-use super::dataset::changed;
-use super::files::{check_name, files};
-use super::listing::{missing, other_count};
-use super::{Entry, Finding, Listing, Longest, Origin, text, write_touch};
+use super::files::{check_name, files, whole_lines};
+use super::finding::Strict;
+use super::read::read_listed;
+use super::{Entry, Finding, Listing, Origin, write_touch};
 use crate::error::{Error, Place, Result, problem};
 use crate::output;
 use crc::{Digest, Table};
 use palpate_shared::Touch;
 use palpate_shared::format::Length;
 use std::fs::File;
-use std::io::{ErrorKind, Seek, SeekFrom, Write};
+use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
@@ -161,7 +161,9 @@ impl Recording {
         let object = &self.recorded.object;
         let Some(entry) = self.listing.objects.iter_mut().find(|entry| entry.name == *object) else { return Ok(0) };
         let longest = self.listing.origin.longest();
-        let touches = read(entry, &self.path, &longest, &mut self.warnings)?.len() as u64;
+        let mut sink = Strict::default();
+        let touches = read_listed(entry, &self.path, true, &longest, &mut sink)?.0.len() as u64;
+        self.warnings = sink.0;
         // What an interrupted recording had not listed is its own.
         let more = touches - entry.touches;
         if let Some(last) = self.listing.recorded.iter_mut().rev().find(|recorded| recorded.object == *object) {
@@ -333,7 +335,7 @@ impl Open {
         let io = |error| Error::io(path, "write the touches", error);
         let mut file = File::options().write(true).create(true).truncate(false).open(path).map_err(io)?;
         let mut there = std::fs::read(path).map_err(io)?;
-        there.truncate(whole(&there).len());
+        there.truncate(whole_lines(&there).len());
         let bytes = there.len() as u64;
         file.set_len(bytes).map_err(io)?;
         file.seek(SeekFrom::End(0)).map_err(io)?;
@@ -383,37 +385,6 @@ fn differences(there: &Origin, here: &Origin) -> Vec<String> {
         }
     }
     differences
-}
-
-/// The touches of a recorded object: at least as many as listed.
-pub(super) fn read(entry: &Entry, path: &Path, longest: &Longest, warnings: &mut Vec<Finding>) -> Result<Vec<Touch>> {
-    let bytes = match std::fs::read(path) {
-        Err(error) if error.kind() == ErrorKind::NotFound && entry.touches == 0 => return Ok(Vec::new()),
-        Err(error) if error.kind() == ErrorKind::NotFound => {
-            return Err(missing(&entry.name).at(Place::file(path)));
-        }
-        read => read.map_err(|error| Error::io(path, "read the touches", error))?,
-    };
-    let whole = whole(&bytes);
-    let touches = text::within(whole, path, longest)?;
-    let (stated, found) = (entry.touches, touches.len() as u64);
-    if found < stated {
-        return Err(other_count(stated, found).at(Place::file(path)));
-    }
-    if whole.len() < bytes.len() {
-        let what = "its last line is not whole and was not read: a recording was interrupted";
-        warnings.push(Finding::warning(path, what, "Record the touch again if it matters."));
-    }
-    if found == stated && entry.crc32.is_some_and(|stated| stated != CRC.checksum(whole)) {
-        warnings.push(changed(path));
-    }
-    Ok(touches)
-}
-
-/// Up to the end of the last whole line.
-fn whole(bytes: &[u8]) -> &[u8] {
-    let end = bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |last| last + 1);
-    &bytes[..end]
 }
 
 /// The lines of touches; with the poses of those that have one.

@@ -152,7 +152,8 @@ fn a_file_that_lost_recorded_touches_is_neither_read_nor_added_to() {
     says(open(directory.path(), "fork"), "missing, although dataset.json lists the object fork");
     // As many, but others: somebody edited them.
     fs::write(&path, text.replacen("0.001000", "0.009000", 1)).unwrap();
-    assert_eq!(Dataset::read_any(directory.path()).unwrap().warnings, [changed(&path)]);
+    let warnings = Dataset::read_any(directory.path()).unwrap().warnings;
+    assert!(warnings.len() == 1 && warnings[0].what.contains("fork.txt: changed since its capture"), "{warnings:?}");
 }
 
 #[test]
