@@ -33,8 +33,6 @@ pub struct Entry {
     pub touches: u64,
     /// Number of approaches that they took.
     pub approaches: u64,
-    /// The size of the object's file.
-    pub bytes: u64,
     /// The CRC-32 (ISO-HDLC, as in gzip and PNG) of the object's file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub crc32: Option<u32>,
@@ -233,7 +231,7 @@ mod tests {
     "approaches": false
   },
   "objects": [
-    {"name": "fork", "touches": 2, "approaches": 31, "bytes": 54}
+    {"name": "fork", "touches": 2, "approaches": 31}
   ]
 }"#;
 
@@ -266,7 +264,7 @@ mod tests {
 
     #[test]
     fn a_listing_that_names_an_object_twice_is_refused() {
-        let entry = "{\"name\": \"fork\", \"touches\": 2, \"approaches\": 31, \"bytes\": 54}";
+        let entry = "{\"name\": \"fork\", \"touches\": 2, \"approaches\": 31}";
         let text = PLAIN.replace(entry, &format!("{entry}, {entry}"));
         let error = Listing::parse(text.as_bytes(), Path::new("dataset.json")).unwrap_err().to_string();
         assert!(error.contains("dataset.json: the object fork is listed twice"), "{error}");

@@ -59,8 +59,8 @@ impl Dataset {
         listing.recorded = self.recorded();
         let first = origin.as_ref().map_or(0, |origin| origin.samples().start);
         let mut writer = Writer::begin(directory, listing)?;
-        for (index, (object, file)) in self.objects.iter().zip(writer.files()).enumerate() {
-            let mut file = file?;
+        for (index, object) in self.objects.iter().enumerate() {
+            let mut file = writer.file(index)?;
             let object = arranged(object, first, file.entry);
             for touches in object.touches().chunks(CHUNK) {
                 let mut lines = String::new();

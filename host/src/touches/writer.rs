@@ -32,14 +32,15 @@ impl Writer {
         Ok(Self { folder: Folder::begin(directory)?, listing })
     }
 
-    /// The files of the objects, in the listing's order, each made when its turn comes.
-    pub(crate) fn files(&mut self) -> impl Iterator<Item = Result<ObjectFile<'_>>> {
-        let folder = self.folder.path();
-        self.listing.objects.iter_mut().map(move |entry| {
-            let path = entry.file(folder);
-            let file = File::create(&path).map_err(|error| not_written(&path, error))?;
-            Ok(ObjectFile { entry, path, file, digest: CRC.digest() })
-        })
+    /// Makes the file of an object, by its number in the listing.
+    ///
+    /// # Errors
+    /// When it cannot be made.
+    pub(crate) fn file(&mut self, object: usize) -> Result<ObjectFile<'_>> {
+        let entry = &mut self.listing.objects[object];
+        let path = entry.file(self.folder.path());
+        let file = File::create(&path).map_err(|error| not_written(&path, error))?;
+        Ok(ObjectFile { entry, path, file, digest: CRC.digest() })
     }
 
     /// Puts the directory in its place, with its listing if that is known to be true. Of a directory that is there, the files
@@ -55,7 +56,7 @@ impl Writer {
     }
 }
 
-impl<'w> ObjectFile<'w> {
+impl ObjectFile<'_> {
     /// Appends the lines of touches, and says how many approaches they took.
     ///
     /// # Errors
@@ -65,18 +66,17 @@ impl<'w> ObjectFile<'w> {
         self.digest.update(lines.as_bytes());
         self.entry.touches += touches;
         self.entry.approaches += approaches;
-        self.entry.bytes += lines.len() as u64;
         Ok(())
     }
 
-    /// Ends the file, and returns its entry of the listing.
+    /// Ends the file.
     ///
     /// # Errors
     /// When it cannot be written.
-    pub(crate) fn close(self) -> Result<&'w Entry> {
+    pub(crate) fn close(self) -> Result<()> {
         self.file.sync_all().map_err(|error| not_written(&self.path, error))?;
         self.entry.crc32 = Some(self.digest.finalize());
-        Ok(self.entry)
+        Ok(())
     }
 }
 

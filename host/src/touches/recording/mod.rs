@@ -13,6 +13,7 @@ use super::checksum::CRC;
 use super::files::{check_name, files, whole_lines};
 use super::finding::Strict;
 use super::read::read_listed;
+use super::recorded::Recorded;
 use super::{Entry, Finding, Listing, Origin, write_touch};
 use crate::error::{Error, Place, Result, problem};
 use crate::output;
@@ -26,31 +27,6 @@ use std::time::{Duration, Instant, SystemTime};
 
 /// Time between two writes of the listing while touches come.
 const CHECKPOINT: Duration = Duration::from_millis(500);
-
-/// A recording of one object: when, from where and by what its touches came.
-#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub struct Recorded {
-    /// The object's name.
-    pub object: String,
-    /// The placement that it lay in on a table, where the recording states one.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub placement: Option<String>,
-    /// Number of touches that the recording added.
-    pub touches: u64,
-    /// Time at which it began, in UTC: `2026-11-22T11:00:00Z`.
-    pub began: String,
-    /// Source of the touches: a port or a file.
-    pub source: String,
-    /// Name and version of the chip's program, if it says so.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub firmware: Option<String>,
-    /// The checksum of the chip's model, which says how long the chip waits for a finger; none without a model.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub model: Option<u32>,
-    /// The CRC-32 of its lines, if they came from a file: so that no file is recorded twice.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub crc32: Option<u32>,
-}
 
 /// A data set to which touches of an object are added.
 pub struct Recording {
@@ -73,7 +49,6 @@ pub struct Recording {
 /// The object's file.
 struct Open {
     file: File,
-    bytes: u64,
     digest: Digest<'static, u32, Table<16>>,
 }
 
@@ -292,7 +267,6 @@ impl Recording {
         };
         // In one piece, so that hardly anything can come in between.
         open.file.write_all(lines.as_bytes()).and_then(|()| open.file.sync_data()).map_err(io)?;
-        open.bytes += lines.len() as u64;
         open.digest.update(lines.as_bytes());
         self.recorded.touches += touches.len() as u64;
         self.added += touches.len() as u64;
@@ -322,7 +296,7 @@ impl Recording {
         }
         let all = self.before + self.recorded.touches;
         if let Some(entry) = self.listing.objects.iter_mut().find(|entry| entry.name == self.recorded.object) {
-            (entry.touches, entry.approaches, entry.bytes) = (all, all, open.bytes);
+            (entry.touches, entry.approaches) = (all, all);
             entry.crc32 = Some(open.digest.clone().finalize());
         }
         self.listing.write(&self.directory)
@@ -336,12 +310,11 @@ impl Open {
         let mut file = File::options().write(true).create(true).truncate(false).open(path).map_err(io)?;
         let mut there = std::fs::read(path).map_err(io)?;
         there.truncate(whole_lines(&there).len());
-        let bytes = there.len() as u64;
-        file.set_len(bytes).map_err(io)?;
+        file.set_len(there.len() as u64).map_err(io)?;
         file.seek(SeekFrom::End(0)).map_err(io)?;
         let mut digest = CRC.digest();
         digest.update(&there);
-        Ok(Self { file, bytes, digest })
+        Ok(Self { file, digest })
     }
 }
 

@@ -76,7 +76,7 @@ fn a_recording_is_a_data_set_whose_listing_says_when_from_where_and_by_what() {
     let listing = Listing::read(directory.path()).unwrap().unwrap();
     let text = fs::read(directory.path().join("spoon.txt")).unwrap();
     let entry = &listing.objects[1];
-    assert_eq!((entry.touches, entry.approaches, entry.bytes), (3, 3, text.len() as u64));
+    assert_eq!((entry.touches, entry.approaches), (3, 3));
     assert_eq!(entry.crc32, Some(CRC.checksum(&text)));
 }
 
