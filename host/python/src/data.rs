@@ -201,7 +201,7 @@ impl DataSet {
             ..Origin::default()
         });
         let longest = origin.as_ref().map_or_else(Longest::default, Origin::longest);
-        longest.check_objects(&objects)?;
+        objects.iter().try_for_each(|object| object.check_times(&longest))?;
         Ok(Self::new(Dataset { origin, ..Dataset::new(objects) }, None))
     }
 

@@ -3,7 +3,7 @@
 //! Sample i of an object is a pure function of (seed, object's name, i) ([`Sampler`]), so neither the number of threads
 //! nor a division into [parts](crate::touches::Samples) changes a touch. Producers compute chunks of samples, one writer puts
 //! them on the disk in order, and bounded channels between them keep the memory flat (`pipeline`). The data set's directory
-//! appears as a whole or not at all ([`Folder`]).
+//! appears as a whole or not at all.
 //!
 //! ```
 //! use palpate::capture::{self, capture};
@@ -35,12 +35,12 @@ mod tests;
 use crate::error::{Error, Kind, Place, Result, problem};
 use crate::in_order::in_order;
 use crate::mesh::{Instance, Object, placements};
-use crate::output::Folder;
 use crate::probe::approach::FINGERS;
 use crate::probe::scene::{Scene, Table};
 use crate::progress::{self, Progress};
-use crate::touches::{Entry, Listing, Lying, ObjectTouches, Origin, Source};
+use crate::touches::{Entry, Listing, Lying, ObjectTouches, Origin, Source, Writer, write_touch};
 use crate::wording::first_ten;
+use palpate_shared::Touch;
 use palpate_shared::format::Length;
 use rayon::prelude::*;
 use std::fs::DirEntry;
@@ -97,7 +97,7 @@ pub struct Summary {
 }
 
 /// Results of a capture for one object.
-#[derive(Clone, Debug, serde::Serialize)]
+#[derive(Clone, Debug, Default, serde::Serialize)]
 pub struct ObjectSummary {
     /// The object's name.
     pub name: String,
@@ -114,6 +114,17 @@ pub struct ObjectSummary {
     pub turned_back: u64,
     /// Duration for the object, in seconds.
     pub seconds: f64,
+}
+
+impl ObjectSummary {
+    /// Adds the counts of more touches.
+    fn add(&mut self, more: &Self) {
+        self.touches += more.touches;
+        self.approaches += more.approaches;
+        self.late.iter_mut().zip(more.late).for_each(|(late, more)| *late += more);
+        self.touching += more.touching;
+        self.turned_back += more.turned_back;
+    }
 }
 
 impl Summary {
@@ -135,24 +146,29 @@ impl Summary {
 /// When a setting is wrong, a mesh cannot be touched, the directory cannot be written, or it holds anything else and
 /// [`Settings::force`] is not set, or recorded touches; [`Kind::Cancelled`](crate::error::Kind::Cancelled) if `progress` cancels it.
 pub fn capture(objects: &[Object], settings: &Settings, directory: &Path, progress: &dyn Progress) -> Result<Summary> {
-    settings.check()?;
     let start = Instant::now();
-    let mut objects: Vec<&Object> = objects.iter().collect();
-    objects.sort_by(|a, b| a.name.cmp(&b.name));
-    let scenes = scenes(&objects, &settings.origin, progress)?;
-    let samplers: Vec<Sampler<'_>> = objects
-        .iter()
-        .zip(&scenes)
-        .map(|(object, scenes)| Sampler::of_instances(scenes, &object.name, &settings.origin))
-        .collect();
+    let (objects, scenes) = sampled(objects, settings, progress)?;
+    let samplers = samplers(&objects, &scenes, &settings.origin);
     untouched(&samplers, &settings.origin).map_or(Ok(()), Err)?;
     let entries = objects.iter().zip(&scenes).map(|(object, scenes)| entry(object, scenes, &settings.origin)).collect();
-    let mut listing = Listing { objects: entries, ..Listing::new(&settings.origin, []) };
+    let listing = Listing { objects: entries, ..Listing::new(&settings.origin, []) };
     let replaced = replaced(directory, &listing, settings.force)?;
-    let folder = Folder::begin(directory)?;
-    let objects = pipeline::run(&samplers, settings, folder.path(), &mut listing.objects, progress)?;
-    listing.write(folder.path())?;
-    folder.finish(&replaced)?;
+    let mut writer = Writer::begin(directory, listing)?;
+    let lines = |touches: Vec<Touch>| {
+        let mut lines = String::new();
+        touches.iter().for_each(|touch| write_touch(&mut lines, touch, settings.origin.pose));
+        lines
+    };
+    let to_file = |object: usize, chunks: &mut pipeline::Chunks<'_, String>| {
+        let mut file = writer.file(object)?;
+        for chunk in chunks {
+            let pipeline::Chunk { packed, counts } = chunk?;
+            file.write(&packed, counts.touches, counts.approaches)?;
+        }
+        file.close()
+    };
+    let objects = pipeline::run(&samplers, settings, lines, to_file, progress)?;
+    writer.finish(true, &replaced)?;
     Ok(Summary { objects, seconds: start.elapsed().as_secs_f64() })
 }
 
@@ -189,7 +205,7 @@ fn replaced(directory: &Path, wanted: &Listing, force: bool) -> Result<Vec<Strin
     }
     // Regardless of the version, and of what only the capture tells.
     let stated = |listing: &Listing| {
-        let of = |entry: &Entry| Entry { touches: 0, approaches: 0, bytes: 0, crc32: None, ..entry.clone() };
+        let of = |entry: &Entry| Entry { touches: 0, approaches: 0, crc32: None, ..entry.clone() };
         (listing.origin.clone(), listing.objects.iter().map(of).collect::<Vec<_>>())
     };
     let is_same = found.is_some_and(|found| stated(&found) == stated(wanted));
@@ -211,12 +227,26 @@ fn replaced(directory: &Path, wanted: &Listing, force: bool) -> Result<Vec<Strin
 pub fn untouchable(objects: &[Object], origin: &Origin, progress: &dyn Progress) -> Result<Option<Error>> {
     let objects: Vec<&Object> = objects.iter().collect();
     let scenes = scenes(&objects, origin, progress)?;
-    let samplers: Vec<Sampler<'_>> = objects
-        .iter()
-        .zip(&scenes)
-        .map(|(object, scenes)| Sampler::of_instances(scenes, &object.name, origin))
-        .collect();
-    Ok(untouched(&samplers, origin))
+    Ok(untouched(&samplers(&objects, &scenes, origin), origin))
+}
+
+/// The objects of a capture, sorted by name, and their scenes.
+fn sampled<'o>(
+    objects: &'o [Object],
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<(Vec<&'o Object>, Vec<Vec<Scene>>)> {
+    settings.check()?;
+    let mut objects: Vec<&Object> = objects.iter().collect();
+    objects.sort_by(|a, b| a.name.cmp(&b.name));
+    let scenes = scenes(&objects, &settings.origin, progress)?;
+    Ok((objects, scenes))
+}
+
+/// A sampler of each object.
+fn samplers<'a>(objects: &[&'a Object], scenes: &'a [Vec<Scene>], origin: &'a Origin) -> Vec<Sampler<'a>> {
+    let of = |(object, scenes): (&&'a Object, &'a Vec<Scene>)| Sampler::of_instances(scenes, &object.name, origin);
+    objects.iter().zip(scenes).map(of).collect()
 }
 
 fn untouched(samplers: &[Sampler<'_>], origin: &Origin) -> Option<Error> {

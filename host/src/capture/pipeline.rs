@@ -1,21 +1,17 @@
-//! Producers and one writer, joined by bounded channels.
+//! Producers and one that takes what they make, joined by bounded channels.
 //!
 //! The chunks of all objects form one sequence. Producer p of n computes chunks p, p + n, p + 2n, … and sends them down
-//! its own channel; the writer takes one from each channel in turn, which is the sequence again. A producer that is
+//! its own channel; the taker receives one from each channel in turn, which is the sequence again. A producer that is
 //! ahead waits, so at most a few chunks are in memory regardless of the number of touches.
 
+use super::sample::Drawn;
 use super::{ObjectSummary, Sampler, Settings};
-use crate::error::{Error, Place, Result, problem};
-use crate::probe::approach::FINGERS;
+use crate::error::{Error, Result, problem};
 use crate::progress::{self, Progress};
-use crate::touches::{CRC, Entry, write_touch};
 use crossbeam_channel::{Receiver, Sender, bounded};
-use palpate_shared::ContactPattern;
+use palpate_shared::{ContactPattern, Touch};
 use std::fmt::Display;
-use std::fs::File;
-use std::io::{ErrorKind, Write as _};
 use std::ops::Range;
-use std::path::Path;
 use std::time::Instant;
 
 /// Number of samples in a chunk: some milliseconds of work.
@@ -27,26 +23,29 @@ const AHEAD: usize = 8;
 /// The most producers, even if more are asked for: together they are ahead by a few megabytes at most.
 const MOST_THREADS: usize = 256;
 
-/// Samples that a producer hands to the writer.
-struct Chunk {
-    text: String,
-    approaches: u64,
-    late: [u64; FINGERS],
-    touching: u64,
-    turned_back: u64,
+/// Samples of an object that a producer hands on.
+pub(super) struct Chunk<T> {
+    /// The touches, as the producer packed them.
+    pub(super) packed: T,
+    /// Counts of them.
+    pub(super) counts: ObjectSummary,
 }
 
-/// Captures all samples of each object into a file of the folder, and lists them in the object's entry.
-pub(super) fn run(
+/// Chunks of one object, in their order.
+pub(super) type Chunks<'c, T> = dyn Iterator<Item = Result<Chunk<T>>> + 'c;
+
+/// Captures all samples of each object, chunk by chunk, which producers `pack`. The chunks of each object are given to `take`, with
+/// the object's number: it takes all of them, or fails.
+pub(super) fn run<T: Send>(
     samplers: &[Sampler<'_>],
     settings: &Settings,
-    folder: &Path,
-    entries: &mut [Entry],
+    pack: impl Fn(Vec<Touch>) -> T + Sync,
+    mut take: impl FnMut(usize, &mut Chunks<'_, T>) -> Result<()>,
     progress: &dyn Progress,
 ) -> Result<Vec<ObjectSummary>> {
     let samples = settings.origin.samples();
     progress.begin("touching", Some((samples.end - samples.start) * samplers.len() as u64));
-    let chunks = || chunks(samplers.len(), &samples);
+    let (pack, chunks) = (&pack, || chunks(samplers.len(), &samples));
     // More threads than chunks would have nothing to do.
     let threads = settings.threads().min(MOST_THREADS).min(chunks().take(MOST_THREADS).count()).max(1);
     std::thread::scope(|scope| {
@@ -58,7 +57,8 @@ pub(super) fn run(
             let started = started.clone();
             let work = move || {
                 if started.recv().is_ok() {
-                    produce(chunks, samplers, settings, &sender, progress);
+                    let make = |object: usize, samples| compute(&samplers[object], settings, samples, pack, progress);
+                    produce(chunks, make, &sender);
                 }
             };
             // A system that is out of threads must not end in a panic. The threads that did start end without having
@@ -73,38 +73,17 @@ pub(super) fn run(
         }
         let mut turns = (0..threads).cycle();
         let mut summaries = Vec::with_capacity(samplers.len());
-        for entry in entries {
+        for (object, sampler) in samplers.iter().enumerate() {
             let start = Instant::now();
-            let (mut late, mut touching, mut turned_back) = ([0; FINGERS], 0, 0);
-            let path = entry.file(folder);
-            let io = |error| not_written(&path, &error);
-            let mut file = File::create(&path).map_err(io)?;
-            let mut digest = CRC.digest();
-            for part in split(&samples) {
-                let turn = turns.next().unwrap_or(0);
-                let chunk = receive(&channels[turn])?;
-                let touches = part.end - part.start;
-                file.write_all(chunk.text.as_bytes()).map_err(io)?;
-                digest.update(chunk.text.as_bytes());
-                entry.touches += touches;
-                entry.approaches += chunk.approaches;
-                entry.bytes += chunk.text.len() as u64;
-                late.iter_mut().zip(chunk.late).for_each(|(late, more)| *late += more);
-                touching += chunk.touching;
-                turned_back += chunk.turned_back;
-                progress::advance(progress, touches)?;
-            }
-            file.sync_all().map_err(io)?;
-            entry.crc32 = Some(digest.finalize());
-            summaries.push(ObjectSummary {
-                name: entry.name.clone(),
-                touches: entry.touches,
-                approaches: entry.approaches,
-                late,
-                touching,
-                turned_back,
-                seconds: start.elapsed().as_secs_f64(),
-            });
+            let mut summary = ObjectSummary { name: sampler.name().into(), ..ObjectSummary::default() };
+            let next = |_: Range<u64>| {
+                let chunk = receive(&channels[turns.next().unwrap_or(0)])?;
+                summary.add(&chunk.counts);
+                progress::advance(progress, chunk.counts.touches)?;
+                Ok(chunk)
+            };
+            take(object, &mut split(&samples).map(next))?;
+            summaries.push(ObjectSummary { seconds: start.elapsed().as_secs_f64(), ..summary });
         }
         Ok(summaries)
     })
@@ -116,35 +95,25 @@ fn split(samples: &Range<u64>) -> impl Iterator<Item = Range<u64>> + Clone + use
     samples.clone().step_by(CHUNK as usize).map(move |start| start..end.min(start + CHUNK))
 }
 
-/// The chunks of so many objects, in the order in which they are written.
+/// The chunks of so many objects, in the order in which they are taken.
 fn chunks(objects: usize, samples: &Range<u64>) -> impl Iterator<Item = (usize, Range<u64>)> + use<> {
     let parts = split(samples);
     (0..objects).flat_map(move |object| parts.clone().map(move |part| (object, part)))
 }
 
-fn not_written(path: &Path, error: &std::io::Error) -> Error {
-    let fix = match error.kind() {
-        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => "Free some space, then repeat the capture.",
-        _ => "Check the disk, then repeat the capture.",
-    };
-    problem!("cannot write the touches: {error}").fix(fix).at(Place::file(path))
-}
-
 /// The problem of an operating system that refuses a thread.
-pub(super) fn too_few_threads(started: usize, asked: usize, refusal: &impl Display) -> Error {
+fn too_few_threads(started: usize, asked: usize, refusal: &impl Display) -> Error {
     problem!("the system started only {started} of {asked} threads ({refusal})").fix("Use fewer threads.")
 }
 
-/// Computes chunks until they are all done, one fails, the capture is cancelled or the writer is started.
-fn produce(
+/// Makes chunks until they are all done, one fails, the capture is cancelled or nobody takes them.
+fn produce<T>(
     chunks: impl Iterator<Item = (usize, Range<u64>)>,
-    samplers: &[Sampler<'_>],
-    settings: &Settings,
-    sender: &Sender<Result<Chunk>>,
-    progress: &dyn Progress,
+    make: impl Fn(usize, Range<u64>) -> Result<Chunk<T>>,
+    sender: &Sender<Result<Chunk<T>>>,
 ) {
     for (object, samples) in chunks {
-        let chunk = compute(&samplers[object], settings, samples, progress);
+        let chunk = make(object, samples);
         let failed = chunk.is_err();
         if sender.send(chunk).is_err() || failed {
             return;
@@ -152,21 +121,25 @@ fn produce(
     }
 }
 
-fn compute(sampler: &Sampler<'_>, settings: &Settings, samples: Range<u64>, progress: &dyn Progress) -> Result<Chunk> {
-    let mut chunk = Chunk { text: String::new(), approaches: 0, late: [0; FINGERS], touching: 0, turned_back: 0 };
+fn compute<T>(
+    sampler: &Sampler<'_>,
+    settings: &Settings,
+    samples: Range<u64>,
+    pack: impl Fn(Vec<Touch>) -> T,
+    progress: &dyn Progress,
+) -> Result<Chunk<T>> {
+    let (mut touches, mut counts) = (Vec::with_capacity(CHUNK as usize), ObjectSummary::default());
     for sample in samples {
         progress::check(progress)?;
-        let drawn = sampler.drawn(sample)?;
-        write_touch(&mut chunk.text, &drawn.touch, settings.origin.pose);
-        chunk.approaches += drawn.approaches;
-        chunk.late.iter_mut().zip(drawn.late).for_each(|(late, more)| *late += more);
-        chunk.touching += u64::from(drawn.touch.pattern() != ContactPattern::None);
-        chunk.turned_back += drawn.turned_back;
+        let Drawn { touch, approaches, late, turned_back } = sampler.drawn(sample)?;
+        let touching = u64::from(touch.pattern() != ContactPattern::None);
+        counts.add(&ObjectSummary { touches: 1, approaches, late, touching, turned_back, ..ObjectSummary::default() });
+        touches.push(if settings.origin.pose { touch } else { Touch::new(touch.times()) });
     }
-    Ok(chunk)
+    Ok(Chunk { packed: pack(touches), counts })
 }
 
-fn receive(channel: &Receiver<Result<Chunk>>) -> Result<Chunk> {
+fn receive<T>(channel: &Receiver<Result<Chunk<T>>>) -> Result<Chunk<T>> {
     // A producer only goes away early by a panic, which the scope passes on.
     channel.recv().unwrap_or_else(|_| Err(problem!("a worker stopped").fix("Report this as a bug.")))
 }

@@ -289,7 +289,7 @@ impl StatedProbe {
             let known = if longest < u32::MAX { 4e-6 * f64::from(longest) } else { 0.0 };
             let of_scale = if probe.length == Length::Tenth { of_ten_units(&probe) } else { 0.0 };
             let plausible = Longest::of_scale(names[0], known.max(of_scale), probe.speed, probe.length);
-            plausible.check_objects(&dataset.objects)?;
+            dataset.objects.iter().try_for_each(|object| object.check_times(&plausible))?;
         }
         // Touches with a position are of a table, whatever the probe states.
         let is_located = dataset.touches().any(|touch| touch.position().is_some());

@@ -171,7 +171,8 @@ fn check_times(recorded: &Dataset, scenes: &[Vec<Scene>], origin: &Origin) -> Re
         (high - low).length() + 2.0 * origin.clearance([low, high])
     });
     let (speed, seconds) = (origin.probe.speed, way.fold(0.0, f64::max) / origin.probe.speed);
-    Ok(Longest::of_scale("the simulation", seconds, speed, origin.unit).check_objects(&recorded.objects)?)
+    let longest = Longest::of_scale("the simulation", seconds, speed, origin.unit);
+    recorded.objects.iter().try_for_each(|object| object.check_times(&longest))
 }
 
 /// The object or placement of each recording, if there are enough touches.

@@ -1,20 +1,17 @@
 //! A data set: a directory with one file per object.
 
-use super::alike::{Alike, other_position};
-use super::files::{EXTENSION, files};
-use super::listing::{missing, other_count};
-use super::{Entry, Finding, Listing, Log, Longest, ObjectTouches, Origin, Recorded, Source, is_log, recording, text};
-use crate::error::{Error, Place, Result, problem};
+use super::files::{EXTENSION, PARQUET};
+use super::finding::Strict;
+use super::read::{Content, parquet, read};
+use super::{Finding, ObjectTouches, Origin, Recorded, Source, text};
+use crate::error::{Place, Result, problem};
 use crate::probe::approach::Probe;
 use crate::probe::hand;
 use crate::probe::noise::Noise;
 use palpate_shared::Touch;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
-
-/// The extension of tables that are refused with what to use instead.
-const PARQUET: &str = "parquet";
+use std::path::Path;
 
 /// The touches of two or more objects, and how they were made.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -147,7 +144,7 @@ impl Dataset {
     }
 
     /// Reads the data set in a directory: the files that its `dataset.json` names and no other, or, without one, every
-    /// `<object>.txt` and log (`<name>.mcap`, see [`Log::by_object`]; its content decides that a file is one). Touches of one object in several logs are joined in the order of the logs' names. The path of a log is a data
+    /// `<object>.txt` and log (`<name>.mcap`, see [`Log::by_object`](super::Log::by_object); its content decides that a file is one). Touches of one object in several logs are joined in the order of the logs' names. The path of a log is a data
     /// set too.
     ///
     /// A text file that was changed since its capture but has as many touches as stated is a warning.
@@ -171,21 +168,10 @@ impl Dataset {
     /// # Errors
     /// Errors of [`read`](Self::read), except that one object is enough.
     pub fn read_any(directory: &Path) -> Result<Self> {
-        let dataset = match is_log(directory) {
-            true => {
-                let (objects, warnings) = found_in(&[directory.into()])?;
-                alike(&objects)?;
-                Self { warnings, ..Self::new(objects_of(objects)) }
-            }
-            false => match Listing::read(directory)? {
-                Some(listing) => Self::listed(directory, listing)?,
-                None => Self::found(directory)?,
-            },
-        };
-        match dataset.objects.is_empty() {
-            true => Err(no_objects().at(Place::file(directory))),
-            false => Ok(dataset),
-        }
+        let mut sink = Strict::default();
+        let Content { objects, listing } = read(directory, &mut sink)?;
+        let objects = objects.into_iter().map(|found| found.touches).collect();
+        Ok(Self { objects, origin: listing.map(|listing| listing.origin), warnings: sink.0 })
     }
 
     /// The touches of one file, as an object that is called like it.
@@ -202,59 +188,6 @@ impl Dataset {
                 .fix("Name it after the object, with the extension .txt.")
                 .at(Place::file(path))),
         }
-    }
-
-    /// Reads the data set that a listing describes.
-    fn listed(directory: &Path, listing: Listing) -> Result<Self> {
-        let (mut objects, mut warnings) = (Vec::with_capacity(listing.objects.len()), Vec::new());
-        // It may grow while it is recorded.
-        let (may_grow, longest) = (listing.is_recorded(), listing.origin.longest());
-        for entry in &listing.objects {
-            let path = entry.file(directory);
-            let touches = match may_grow {
-                true => recording::read(entry, &path, &longest, &mut warnings)?,
-                false => read_listed(entry, &path, &longest, &mut warnings)?,
-            };
-            if touches.first().is_some_and(|touch| touch.position().is_some() != listing.origin.position) {
-                return Err(other_position(!listing.origin.position, Listing::STATED).at(Place::file(&path)));
-            }
-            // Of an object whose recording was interrupted before its first touch.
-            if may_grow && touches.is_empty() {
-                continue;
-            }
-            objects
-                .push(listing.with_sources(entry, touches).map_err(|error| error.in_file(Listing::path(directory)))?);
-        }
-        objects.sort_by(|a, b| a.name.cmp(&b.name));
-        Ok(Self { objects, origin: Some(listing.origin), warnings })
-    }
-
-    /// Every file of touches.
-    fn found(directory: &Path) -> Result<Self> {
-        if let Some(table) = of_extension(directory, PARQUET)?.first() {
-            return Err(parquet(table));
-        }
-        let mut logs = logs(directory)?;
-        let mut objects = BTreeMap::new();
-        for (name, path) in files(directory)? {
-            match is_log(&path) {
-                true => logs.push(path),
-                false => {
-                    let touches = ObjectTouches::new(name.clone(), text::read(&path)?, Source::Object);
-                    objects.insert(name, Found { touches, file: path });
-                }
-            }
-        }
-        logs.sort();
-        let (logged, warnings) = found_in(&logs)?;
-        for (name, found) in logged {
-            if let Some(Found { file, .. }) = objects.get(&name) {
-                return Err(two_files(&name, file, &found.file).at(Place::file(directory)));
-            }
-            objects.insert(name, found);
-        }
-        alike(&objects)?;
-        Ok(Self { warnings, ..Self::new(objects_of(objects)) })
     }
 
     /// The probe that made the touches, if known.
@@ -308,103 +241,11 @@ impl Dataset {
     }
 }
 
-/// Reads an object's file, and compares it with the listing.
-fn read_listed(entry: &Entry, path: &Path, longest: &Longest, warnings: &mut Vec<Finding>) -> Result<Vec<Touch>> {
-    if !path.exists() {
-        return Err(missing(&entry.name).at(Place::file(path)));
-    }
-    let (touches, found) = text::read_with_checksum(path, longest)?;
-    if touches.len() as u64 != entry.touches {
-        return Err(other_count(entry.touches, touches.len() as u64).at(Place::file(path)));
-    }
-    if entry.crc32.is_some_and(|stated| stated != found) {
-        warnings.push(changed(path));
-    }
-    Ok(touches)
-}
-
-/// The warning about a text file that has as many touches as `dataset.json` states, but was changed since its capture.
-pub(super) fn changed(path: &Path) -> Finding {
-    let what = format_args!("changed since its capture: its checksum is not the one in {}", Listing::FILE);
-    Finding::warning(path, what, "Capture it again if that is not meant.")
-}
-
-/// The problem of a directory without files of touches.
-pub(super) fn no_objects() -> Error {
-    problem!("no touches here (no .txt or .mcap file)").fix("Fill it with: palpate capture builtin -o DIR.")
-}
-
-/// The problem of an object that is in a log and in a file of lines, where no listing says which counts.
-pub(super) fn two_files(name: &str, file: &Path, other: &Path) -> Error {
-    problem!("two files of the object {name}: {} and {}", file.display(), other.display()).fix("Remove one of them.")
-}
-
-fn parquet(path: &Path) -> Error {
-    problem!("Parquet is not read")
-        .fix(format!("Instead, {}.", crate::gone::instead(".parquet").unwrap_or_default()))
-        .at(Place::file(path))
-}
-
-/// Touches of an object, and the file that has them, or the first of several.
-struct Found {
-    touches: ObjectTouches,
-    file: PathBuf,
-}
-
-/// Contents of logs by object, one log after the other, and the skipped channels.
-fn found_in(logs: &[PathBuf]) -> Result<(BTreeMap<String, Found>, Vec<Finding>)> {
-    let (mut objects, mut warnings) = (BTreeMap::<String, Found>::new(), Vec::new());
-    for file in logs {
-        let log = Log::read(file)?;
-        for touches in log.by_object(&name_of(file))? {
-            match objects.get_mut(&touches.name) {
-                Some(found) => found.touches.append(&touches),
-                None => _ = objects.insert(touches.name.clone(), Found { touches, file: file.clone() }),
-            }
-        }
-        warnings.extend(log.skipped());
-    }
-    Ok((objects, warnings))
-}
-
-/// Refuses objects of which some have positions and others have none.
-fn alike(found: &BTreeMap<String, Found>) -> Result<()> {
-    let mut alike = Alike::default();
-    for Found { touches, file } in found.values() {
-        let mut touches = touches.touches().iter();
-        touches.try_for_each(|touch| alike.admit(touch)).map_err(|error| error.at(Place::file(file)))?;
-    }
-    Ok(())
-}
-
-fn objects_of(found: BTreeMap<String, Found>) -> Vec<ObjectTouches> {
-    found.into_values().map(|found| found.touches).collect()
-}
-
-/// The logs in a directory by their names, which end in `.mcap`, sorted.
-pub(crate) fn logs(directory: &Path) -> Result<Vec<PathBuf>> {
-    of_extension(directory, Log::EXTENSION)
-}
-
-/// The files in a directory whose names end like this, sorted.
-fn of_extension(directory: &Path, ending: &str) -> Result<Vec<PathBuf>> {
-    let io = |source| Error::io(directory, "read the data set", source);
-    let entries = std::fs::read_dir(directory).map_err(io)?;
-    let mut paths = entries.map(|entry| Ok(entry.map_err(io)?.path())).collect::<Result<Vec<_>>>()?;
-    paths.retain(|path| path.extension().is_some_and(|extension| extension == ending));
-    paths.sort();
-    Ok(paths)
-}
-
-/// The object that a file is called like.
-pub(super) fn name_of(path: &Path) -> String {
-    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::touches::checksum;
+    use crate::touches::Listing;
+    use crate::touches::checksum::CRC;
 
     /// A data set of two objects, with its listing.
     fn captured() -> tempfile::TempDir {
@@ -416,9 +257,9 @@ mod tests {
             let touch = |i: u32| Touch::from_micros([0, i, index as u32]);
             let mut text = String::new();
             (0..3).for_each(|i| super::super::write_touch(&mut text, &touch(i), false));
-            std::fs::write(&path, text).unwrap();
             entry.touches = 3;
-            entry.crc32 = Some(checksum(&path).unwrap());
+            entry.crc32 = Some(CRC.checksum(text.as_bytes()));
+            std::fs::write(&path, text).unwrap();
         }
         listing.write(directory.path()).unwrap();
         directory
@@ -549,9 +390,6 @@ mod tests {
 
     #[test]
     fn checksums_are_those_of_gzip() {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("check");
-        std::fs::write(&path, "123456789").unwrap();
-        assert_eq!(checksum(&path).unwrap(), 0xcbf4_3926);
+        assert_eq!(CRC.checksum(b"123456789"), 0xcbf4_3926);
     }
 }

@@ -5,23 +5,47 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
+/// Extension of logs.
+pub(super) const LOG: &str = "mcap";
+
 /// The extension of a file of touches.
 pub(crate) const EXTENSION: &str = "txt";
 
 /// The objects' names and files in a directory, sorted by name, regardless of any listing.
 pub(crate) fn files(directory: &Path) -> Result<Vec<(String, PathBuf)>> {
-    let io = |source| Error::io(directory, "read the data set", source);
-    let mut files = Vec::new();
-    for entry in std::fs::read_dir(directory).map_err(io)? {
-        let path = entry.map_err(io)?.path();
-        if path.extension().is_some_and(|extension| extension == EXTENSION)
-            && let Some(name) = path.file_stem().and_then(|stem| stem.to_str())
-        {
-            files.push((name.to_owned(), path));
-        }
-    }
+    let named = |path: PathBuf| Some((path.file_stem()?.to_str()?.to_owned(), path));
+    let mut files: Vec<_> = of_extension(directory, EXTENSION)?.into_iter().filter_map(named).collect();
     files.sort();
     Ok(files)
+}
+
+/// The extension of tables that are refused with what to use instead.
+pub(super) const PARQUET: &str = "parquet";
+
+/// The logs in a directory by their names, which end in `.mcap`, sorted.
+pub(crate) fn logs(directory: &Path) -> Result<Vec<PathBuf>> {
+    of_extension(directory, LOG)
+}
+
+/// The files in a directory whose names end like this, sorted.
+pub(super) fn of_extension(directory: &Path, ending: &str) -> Result<Vec<PathBuf>> {
+    let io = |source| Error::io(directory, "read the data set", source);
+    let entries = std::fs::read_dir(directory).map_err(io)?;
+    let mut paths = entries.map(|entry| Ok(entry.map_err(io)?.path())).collect::<Result<Vec<_>>>()?;
+    paths.retain(|path| path.extension().is_some_and(|extension| extension == ending));
+    paths.sort();
+    Ok(paths)
+}
+
+/// The object that a file is called like.
+pub(super) fn name_of(path: &Path) -> String {
+    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// A text up to the end of its last whole line.
+pub(super) fn whole_lines(bytes: &[u8]) -> &[u8] {
+    let end = bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |last| last + 1);
+    &bytes[..end]
 }
 
 /// Refuses the name of an object that files of a directory cannot have.

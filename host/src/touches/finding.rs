@@ -1,6 +1,6 @@
-//! Something that is wrong with a data set, or may be.
+//! Something that is wrong with a data set, or may be, and those who are told of it.
 
-use crate::error::{Error, Place};
+use crate::error::{Error, Place, Result};
 use std::fmt;
 use std::path::Path;
 
@@ -38,5 +38,28 @@ impl Finding {
     /// Something that needs to be known, about which nothing needs to be done.
     pub(super) fn remark(path: &Path, what: impl fmt::Display) -> Self {
         Self::warning(path, what, "")
+    }
+}
+
+/// Takes what a reader of touches finds.
+pub(super) trait Sink {
+    /// Takes a fault. The reading ends with an error that is returned, and goes on otherwise.
+    fn fault(&mut self, error: Error) -> Result<()>;
+
+    /// Takes something that may be meant.
+    fn warning(&mut self, finding: Finding);
+}
+
+/// Ends the reading at the first fault, and keeps the warnings.
+#[derive(Default)]
+pub(super) struct Strict(pub(super) Vec<Finding>);
+
+impl Sink for Strict {
+    fn fault(&mut self, error: Error) -> Result<()> {
+        Err(error)
+    }
+
+    fn warning(&mut self, finding: Finding) {
+        self.0.push(finding);
     }
 }

@@ -33,8 +33,6 @@ pub struct Entry {
     pub touches: u64,
     /// Number of approaches that they took.
     pub approaches: u64,
-    /// The size of the object's file.
-    pub bytes: u64,
     /// The CRC-32 (ISO-HDLC, as in gzip and PNG) of the object's file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub crc32: Option<u32>,
@@ -102,9 +100,6 @@ impl Entry {
 impl Listing {
     /// The file's name.
     pub const FILE: &str = "dataset.json";
-
-    /// The touches as the file states them, for messages.
-    pub(super) const STATED: &str = "the touches that dataset.json states";
 
     /// A listing of objects without touches so far.
     pub(crate) fn new(origin: &Origin, names: impl IntoIterator<Item = String>) -> Self {
@@ -220,19 +215,6 @@ fn not_a_listing(why: impl Display) -> Error {
     problem!("not the listing of a data set ({why})").fix(FROM_ELSEWHERE)
 }
 
-/// Remedy for a file that differs from what `dataset.json` states.
-const RESTORE: &str = "Restore the file or capture the objects again, or remove dataset.json if this is meant.";
-
-/// The problem of a listed object whose file is not there.
-pub(super) fn missing(name: &str) -> Error {
-    problem!("missing, although dataset.json lists the object {name}").fix(RESTORE)
-}
-
-/// The problem of a file that has another number of touches than listed.
-pub(super) fn other_count(stated: u64, found: u64) -> Error {
-    problem!("{found} touches where dataset.json states {stated}").fix(RESTORE)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -249,7 +231,7 @@ mod tests {
     "approaches": false
   },
   "objects": [
-    {"name": "fork", "touches": 2, "approaches": 31, "bytes": 54}
+    {"name": "fork", "touches": 2, "approaches": 31}
   ]
 }"#;
 
@@ -282,7 +264,7 @@ mod tests {
 
     #[test]
     fn a_listing_that_names_an_object_twice_is_refused() {
-        let entry = "{\"name\": \"fork\", \"touches\": 2, \"approaches\": 31, \"bytes\": 54}";
+        let entry = "{\"name\": \"fork\", \"touches\": 2, \"approaches\": 31}";
         let text = PLAIN.replace(entry, &format!("{entry}, {entry}"));
         let error = Listing::parse(text.as_bytes(), Path::new("dataset.json")).unwrap_err().to_string();
         assert!(error.contains("dataset.json: the object fork is listed twice"), "{error}");

@@ -1,7 +1,7 @@
 //! Touches out of a robot's log, which is an MCAP file: `docs/reference/mcap.md` says what belongs in it.
 
 use super::alike::Alike;
-use super::files::is_log;
+use super::files::{LOG, is_log};
 use super::finding::Finding;
 use super::logged::{Channels, Message, too_large};
 use super::{Longest, ObjectTouches, Source, mcap, text};
@@ -52,7 +52,7 @@ pub fn read_touches(path: &Path) -> Result<Vec<Touch>> {
 
 impl Log {
     /// Extension of logs.
-    pub const EXTENSION: &'static str = "mcap";
+    pub const EXTENSION: &'static str = LOG;
 
     /// Reads a log.
     ///

@@ -1,6 +1,7 @@
 //! The touches of one object, and what each of them is of.
 
-use super::{Origin, Recorded};
+use super::{Longest, Origin, Recorded};
+use crate::error::Result;
 use crate::probe::hand;
 use crate::probe::noise::{Noise, Stream};
 use palpate_shared::Touch;
@@ -253,6 +254,16 @@ impl ObjectTouches {
     /// The touches, in the order of the file.
     pub fn touches(&self) -> &[Touch] {
         &self.touches
+    }
+
+    /// Refuses the touches if many of them take longer than `longest`, as files of touches are refused.
+    ///
+    /// # Errors
+    /// The object and the number of the first such touch, its time, and the longest one.
+    pub fn check_times(&self, longest: &Longest) -> Result<()> {
+        longest
+            .check_all((1_u64..).zip(&self.touches))
+            .map_err(|(number, error)| error.within(format_args!("touch {number} of {}: ", self.name)))
     }
 
     /// Number of touches.

@@ -1,15 +1,17 @@
 //! A data set in memory, to the disk.
 
-use super::{Dataset, Entry, Listing, Lying, ObjectTouches, Source, checksum, files, write_touch};
-use crate::error::{Error, Place, Result, problem};
-use crate::output;
+use super::{Dataset, Entry, Listing, Lying, ObjectTouches, Source, Writer, files, write_touch};
+use crate::error::{Place, Result, problem};
 use crate::wording::first_ten;
 use std::path::Path;
 
+/// Number of touches that are written in one piece.
+const CHUNK: usize = 4096;
+
 impl Dataset {
-    /// Writes the data set into a directory that holds none: a file for each object and, if the origin of the touches is
-    /// known, `dataset.json`, which is written last and says that the data set is complete, which touches are of which
-    /// instance, and which recordings they are from. Text holds poses only if the origin says so or is unknown, or the
+    /// Writes the data set into a directory that holds none, whole or not at all: a file for each object and, if the origin of
+    /// the touches is known, `dataset.json`, which says which touches are of which instance, and which recordings they are
+    /// from. Text holds poses only if the origin says so or is unknown, or the
     /// touches are recorded.
     ///
     /// Touches of instances that are not in turn, such as a part of a capture, are written one instance after the other,
@@ -22,8 +24,7 @@ impl Dataset {
     /// When the directory holds touches; when an object has several instances or logs, and there would be no `dataset.json`
     /// to say so, or has touches of robots that differ; when a file cannot be written.
     pub fn write(&self, directory: &Path, approaches: Option<&[u64]>) -> Result<()> {
-        std::fs::create_dir_all(directory).map_err(|error| Error::io(directory, "make the directory", error))?;
-        let there = files(directory)?;
+        let there = if directory.exists() { files(directory)? } else { Vec::new() };
         let mut names: Vec<String> = there.iter().filter_map(|(_, path)| path.file_name()).map(lossy).collect();
         if Listing::path(directory).exists() {
             names.push(Listing::FILE.into());
@@ -57,31 +58,23 @@ impl Dataset {
         let mut listing = Listing::new(&origin.clone().unwrap_or_default(), self.names());
         listing.recorded = self.recorded();
         let first = origin.as_ref().map_or(0, |origin| origin.samples().start);
-        for (index, (object, entry)) in self.objects.iter().zip(&mut listing.objects).enumerate() {
-            let object = &arranged(object, first, entry);
-            let path = entry.file(directory);
-            output::write_whole(&path, |out| {
-                let mut line = String::new();
-                for touch in object.touches() {
-                    line.clear();
-                    write_touch(&mut line, touch, poses);
-                    out.write_all(line.as_bytes())?;
-                }
-                Ok(())
-            })?;
-            entry.touches = object.len() as u64;
-            entry.bytes = std::fs::metadata(&path).map_err(|error| Error::io(&path, "read the touches", error))?.len();
-            entry.crc32 = Some(checksum(&path)?);
-            entry.approaches = match (approaches.and_then(|approaches| approaches.get(index)), origin) {
+        let mut writer = Writer::begin(directory, listing)?;
+        for (index, object) in self.objects.iter().enumerate() {
+            let mut file = writer.file(index)?;
+            let object = arranged(object, first, file.entry);
+            for touches in object.touches().chunks(CHUNK) {
+                let mut lines = String::new();
+                touches.iter().for_each(|touch| write_touch(&mut lines, touch, poses));
+                file.write(&lines, touches.len() as u64, 0)?;
+            }
+            file.entry.approaches = match (approaches.and_then(|approaches| approaches.get(index)), origin) {
                 (Some(&approaches), _) => approaches,
-                (None, Some(origin)) if origin.approaches => entry.touches,
+                (None, Some(origin)) if origin.approaches => object.len() as u64,
                 (None, _) => 0,
             };
+            file.close()?;
         }
-        if origin.is_none() {
-            return Ok(());
-        }
-        listing.write(directory)
+        writer.finish(origin.is_some(), &[])
     }
 }
 

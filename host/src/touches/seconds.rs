@@ -1,6 +1,5 @@
 //! A touch from numbers, as tables and arrays hold them, and times that are plausible.
 
-use super::ObjectTouches;
 use crate::error::{Error, Result, problem};
 use crate::probe::approach::to_q15;
 use palpate_shared::format::Length;
@@ -158,16 +157,5 @@ impl Longest {
             }
         }
         first.filter(|_| 2 * long >= all).map_or(Ok(()), Err)
-    }
-
-    /// Refuses touches in memory that take longer, object by object.
-    ///
-    /// # Errors
-    /// The object and the number of the touch, its time, and the longest one.
-    pub fn check_objects(&self, objects: &[ObjectTouches]) -> Result<()> {
-        objects.iter().try_for_each(|object| {
-            self.check_all((1_u64..).zip(object.touches()))
-                .map_err(|(number, error)| error.within(format_args!("touch {number} of {}: ", object.name)))
-        })
     }
 }

@@ -7,10 +7,10 @@
 //! format.
 
 use super::alike::Alike;
-use super::checksum::Checked;
 use super::files::refuse_bag;
+use super::finding::{Sink, Strict};
 use super::seconds::{Longest, contact_times, position, unit_vector};
-use crate::error::{Error, Place, Result, problem};
+use crate::error::{Error, Kind, Place, Result, problem};
 use palpate_shared::{Pose, Q15_ONE, Touch};
 use std::fmt::Write as _;
 use std::fs::File;
@@ -102,18 +102,17 @@ pub(super) fn numbered(text: impl BufRead, path: &Path) -> impl Iterator<Item = 
 /// # Errors
 /// When the file cannot be read, holds no touch, has a wrong line, or times that are not in seconds.
 pub fn read(path: &Path) -> Result<Vec<Touch>> {
-    read_with_checksum(path, &Longest::default()).map(|(touches, _)| touches)
+    read_file(path, &mut Strict::default())
 }
 
-/// Reads the touches, none of which is expected to take longer than `longest`, and the file's checksum.
-pub(super) fn read_with_checksum(path: &Path, longest: &Longest) -> Result<(Vec<Touch>, u32)> {
+/// Reads a text file as [`read`]; wrong lines are left out, if the sink takes the faults.
+pub(super) fn read_file(path: &Path, sink: &mut dyn Sink) -> Result<Vec<Touch>> {
     let file = File::open(path).map_err(|source| Error::io(path, "read the touches", source))?;
-    let mut text = BufReader::with_capacity(1 << 16, Checked::new(file));
-    let touches = within(&mut text, path, longest)?;
-    if touches.is_empty() {
-        return Err(no_touches().at(Place::file(path)));
+    let (touches, is_right) = read_lines(BufReader::with_capacity(1 << 16, file), path, &Longest::default(), sink)?;
+    if touches.is_empty() && is_right {
+        sink.fault(no_touches().at(Place::file(path)))?;
     }
-    Ok((touches, text.into_inner().checksum()))
+    Ok(touches)
 }
 
 /// The problem of a file without touches.
@@ -126,10 +125,42 @@ pub(super) fn no_touches() -> Error {
 /// # Errors
 /// When a line is wrong, or times are not in seconds.
 pub fn within(text: impl BufRead, path: &Path, longest: &Longest) -> Result<Vec<Touch>> {
-    let touches = numbered(text, path).collect::<Result<Vec<_>>>()?;
+    read_lines(text, path, longest, &mut Strict::default()).map(|(touches, _)| touches)
+}
+
+/// Largest number of wrong lines of a file that a sink is given; the others are counted.
+const MOST_LINES: usize = 20;
+
+/// The touches of the right lines of a text; true if all are right.
+pub(super) fn read_lines(
+    text: impl BufRead,
+    path: &Path,
+    longest: &Longest,
+    sink: &mut dyn Sink,
+) -> Result<(Vec<Touch>, bool)> {
+    let (mut touches, mut wrong) = (Vec::new(), 0);
+    for touch in numbered(text, path) {
+        match touch {
+            Ok(touch) => touches.push(touch),
+            Err(error) if error.is(&Kind::Io) => return Err(error),
+            Err(error) => {
+                wrong += 1;
+                if wrong <= MOST_LINES {
+                    sink.fault(error)?;
+                }
+            }
+        }
+    }
+    if wrong > MOST_LINES {
+        let more = problem!("{} more lines are wrong", wrong - MOST_LINES).fix("Correct them, or capture again.");
+        sink.fault(more.at(Place::file(path)))?;
+    }
     let checked = longest.check_all(touches.iter().map(|(line, touch)| (*line, touch)));
-    checked.map_err(|(line, error)| error.at(Place::line(path, line)))?;
-    Ok(touches.into_iter().map(|(_, touch)| touch).collect())
+    let is_right = wrong == 0 && checked.is_ok();
+    if let Err((line, error)) = checked {
+        sink.fault(error.at(Place::line(path, line)))?;
+    }
+    Ok((touches.into_iter().map(|(_, touch)| touch).collect(), is_right))
 }
 
 /// Reads one line: three contact times in seconds on any common clock (`-` where missing), rounded to whole

@@ -1,7 +1,7 @@
 //! Summary of a data set: counts, patterns, ranges, quantiles of features.
 
-use super::{Key, Read, key};
-use crate::touches::Origin;
+use super::{Found, Key, key};
+use crate::touches::{Listing, ObjectTouches, Origin};
 use palpate_shared::{Descriptor, Touch};
 use std::collections::HashSet;
 
@@ -47,8 +47,11 @@ pub struct ObjectSummary {
 pub type Quantiles = [f64; 7];
 
 impl Summary {
-    pub(super) fn of(objects: &[Read], origin: Option<Origin>) -> Self {
-        Self { objects: objects.iter().map(ObjectSummary::of).collect(), origin }
+    pub(super) fn of(objects: &[Found], listing: Option<Listing>) -> Self {
+        let entries = listing.as_ref().map_or(&[][..], |listing| &listing.objects);
+        let stated = |name: &str| entries.iter().find(|entry| entry.name == name).map(|entry| entry.approaches);
+        let of = |object: &Found| ObjectSummary::of(&object.touches, stated(&object.touches.name));
+        Self { objects: objects.iter().map(of).collect(), origin: listing.map(|listing| listing.origin) }
     }
 
     /// Number of touches in all.
@@ -58,7 +61,8 @@ impl Summary {
 }
 
 impl ObjectSummary {
-    fn of(Read { name, touches, approaches, .. }: &Read) -> Self {
+    fn of(object: &ObjectTouches, approaches: Option<u64>) -> Self {
+        let touches = object.touches();
         let mut patterns = [0; 6];
         for touch in touches {
             if let Some(count) = patterns.get_mut(usize::from(touch.pattern().code())) {
@@ -73,9 +77,9 @@ impl ObjectSummary {
             quantiles(full.filter_map(value).collect())
         };
         Self {
-            name: name.clone(),
+            name: object.name.clone(),
             touches: touches.len() as u64,
-            approaches: *approaches,
+            approaches,
             patterns,
             duplicates,
             posed: touches.iter().filter(|touch| touch.pose().is_some()).count() as u64,

@@ -1,5 +1,6 @@
 use super::*;
-use crate::touches::{Dataset, checksum, write_touch};
+use crate::touches::checksum::CRC;
+use crate::touches::{Dataset, text, write_touch};
 
 /// Thirty touches that differ, of an object with this number.
 fn touches(object: u32) -> Vec<Touch> {
@@ -18,8 +19,9 @@ fn captured() -> tempfile::TempDir {
     let mut listing = Listing::new(&Origin { touches: 30, ..Origin::default() }, ["fork".into(), "spoon".into()]);
     for (index, entry) in listing.objects.iter_mut().enumerate() {
         let path = directory.path().join(format!("{}.txt", entry.name));
-        std::fs::write(&path, lines(&touches(index as u32))).unwrap();
-        (entry.touches, entry.approaches, entry.crc32) = (30, 90, Some(checksum(&path).unwrap()));
+        let text = lines(&touches(index as u32));
+        std::fs::write(&path, &text).unwrap();
+        (entry.touches, entry.approaches, entry.crc32) = (30, 90, Some(CRC.checksum(text.as_bytes())));
     }
     listing.write(directory.path()).unwrap();
     directory
@@ -121,7 +123,7 @@ fn what_reads_well_and_trains_badly_is_wrong() {
     wrong(with(&posed, false).path(), "30 of 60 touches have a pose and the others have none");
     let located = |touch: &Touch| touch.with_position(palpate_shared::Position { micrometers: [1, 2, 3] });
     let located: Vec<Touch> = posed.iter().map(located).collect();
-    wrong(with(&located, false).path(), "30 of 60 touches have a position and the others have none");
+    wrong(with(&located, false).path(), "spoon.txt: a position, where the touches before it have none");
     wrong(with(&located, true).path(), "a position, where the touches that dataset.json states have none");
     wrong(
         with(&[&posed[..1], &located[..]].concat(), false).path(),

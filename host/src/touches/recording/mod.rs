@@ -10,47 +10,23 @@ mod tests;
 
 use super::alike::other_position;
 use super::checksum::CRC;
-use super::dataset::changed;
-use super::files::{check_name, files};
-use super::listing::{missing, other_count};
-use super::{Entry, Finding, Listing, Longest, Origin, text, write_touch};
+use super::files::{check_name, files, whole_lines};
+use super::finding::Strict;
+use super::read::read_listed;
+use super::recorded::Recorded;
+use super::{Entry, Finding, Listing, Origin, write_touch};
 use crate::error::{Error, Place, Result, problem};
 use crate::output;
 use crc::{Digest, Table};
 use palpate_shared::Touch;
 use palpate_shared::format::Length;
 use std::fs::File;
-use std::io::{ErrorKind, Seek, SeekFrom, Write};
+use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
 /// Time between two writes of the listing while touches come.
 const CHECKPOINT: Duration = Duration::from_millis(500);
-
-/// A recording of one object: when, from where and by what its touches came.
-#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub struct Recorded {
-    /// The object's name.
-    pub object: String,
-    /// The placement that it lay in on a table, where the recording states one.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub placement: Option<String>,
-    /// Number of touches that the recording added.
-    pub touches: u64,
-    /// Time at which it began, in UTC: `2026-11-22T11:00:00Z`.
-    pub began: String,
-    /// Source of the touches: a port or a file.
-    pub source: String,
-    /// Name and version of the chip's program, if it says so.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub firmware: Option<String>,
-    /// The checksum of the chip's model, which says how long the chip waits for a finger; none without a model.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub model: Option<u32>,
-    /// The CRC-32 of its lines, if they came from a file: so that no file is recorded twice.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub crc32: Option<u32>,
-}
 
 /// A data set to which touches of an object are added.
 pub struct Recording {
@@ -73,7 +49,6 @@ pub struct Recording {
 /// The object's file.
 struct Open {
     file: File,
-    bytes: u64,
     digest: Digest<'static, u32, Table<16>>,
 }
 
@@ -161,7 +136,9 @@ impl Recording {
         let object = &self.recorded.object;
         let Some(entry) = self.listing.objects.iter_mut().find(|entry| entry.name == *object) else { return Ok(0) };
         let longest = self.listing.origin.longest();
-        let touches = read(entry, &self.path, &longest, &mut self.warnings)?.len() as u64;
+        let mut sink = Strict::default();
+        let touches = read_listed(entry, &self.path, true, &longest, &mut sink)?.0.len() as u64;
+        self.warnings = sink.0;
         // What an interrupted recording had not listed is its own.
         let more = touches - entry.touches;
         if let Some(last) = self.listing.recorded.iter_mut().rev().find(|recorded| recorded.object == *object) {
@@ -290,7 +267,6 @@ impl Recording {
         };
         // In one piece, so that hardly anything can come in between.
         open.file.write_all(lines.as_bytes()).and_then(|()| open.file.sync_data()).map_err(io)?;
-        open.bytes += lines.len() as u64;
         open.digest.update(lines.as_bytes());
         self.recorded.touches += touches.len() as u64;
         self.added += touches.len() as u64;
@@ -320,7 +296,7 @@ impl Recording {
         }
         let all = self.before + self.recorded.touches;
         if let Some(entry) = self.listing.objects.iter_mut().find(|entry| entry.name == self.recorded.object) {
-            (entry.touches, entry.approaches, entry.bytes) = (all, all, open.bytes);
+            (entry.touches, entry.approaches) = (all, all);
             entry.crc32 = Some(open.digest.clone().finalize());
         }
         self.listing.write(&self.directory)
@@ -333,13 +309,12 @@ impl Open {
         let io = |error| Error::io(path, "write the touches", error);
         let mut file = File::options().write(true).create(true).truncate(false).open(path).map_err(io)?;
         let mut there = std::fs::read(path).map_err(io)?;
-        there.truncate(whole(&there).len());
-        let bytes = there.len() as u64;
-        file.set_len(bytes).map_err(io)?;
+        there.truncate(whole_lines(&there).len());
+        file.set_len(there.len() as u64).map_err(io)?;
         file.seek(SeekFrom::End(0)).map_err(io)?;
         let mut digest = CRC.digest();
         digest.update(&there);
-        Ok(Self { file, bytes, digest })
+        Ok(Self { file, digest })
     }
 }
 
@@ -383,37 +358,6 @@ fn differences(there: &Origin, here: &Origin) -> Vec<String> {
         }
     }
     differences
-}
-
-/// The touches of a recorded object: at least as many as listed.
-pub(super) fn read(entry: &Entry, path: &Path, longest: &Longest, warnings: &mut Vec<Finding>) -> Result<Vec<Touch>> {
-    let bytes = match std::fs::read(path) {
-        Err(error) if error.kind() == ErrorKind::NotFound && entry.touches == 0 => return Ok(Vec::new()),
-        Err(error) if error.kind() == ErrorKind::NotFound => {
-            return Err(missing(&entry.name).at(Place::file(path)));
-        }
-        read => read.map_err(|error| Error::io(path, "read the touches", error))?,
-    };
-    let whole = whole(&bytes);
-    let touches = text::within(whole, path, longest)?;
-    let (stated, found) = (entry.touches, touches.len() as u64);
-    if found < stated {
-        return Err(other_count(stated, found).at(Place::file(path)));
-    }
-    if whole.len() < bytes.len() {
-        let what = "its last line is not whole and was not read: a recording was interrupted";
-        warnings.push(Finding::warning(path, what, "Record the touch again if it matters."));
-    }
-    if found == stated && entry.crc32.is_some_and(|stated| stated != CRC.checksum(whole)) {
-        warnings.push(changed(path));
-    }
-    Ok(touches)
-}
-
-/// Up to the end of the last whole line.
-fn whole(bytes: &[u8]) -> &[u8] {
-    let end = bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |last| last + 1);
-    &bytes[..end]
 }
 
 /// The lines of touches; with the poses of those that have one.

@@ -76,7 +76,7 @@ fn a_recording_is_a_data_set_whose_listing_says_when_from_where_and_by_what() {
     let listing = Listing::read(directory.path()).unwrap().unwrap();
     let text = fs::read(directory.path().join("spoon.txt")).unwrap();
     let entry = &listing.objects[1];
-    assert_eq!((entry.touches, entry.approaches, entry.bytes), (3, 3, text.len() as u64));
+    assert_eq!((entry.touches, entry.approaches), (3, 3));
     assert_eq!(entry.crc32, Some(CRC.checksum(&text)));
 }
 
@@ -152,7 +152,8 @@ fn a_file_that_lost_recorded_touches_is_neither_read_nor_added_to() {
     says(open(directory.path(), "fork"), "missing, although dataset.json lists the object fork");
     // As many, but others: somebody edited them.
     fs::write(&path, text.replacen("0.001000", "0.009000", 1)).unwrap();
-    assert_eq!(Dataset::read_any(directory.path()).unwrap().warnings, [changed(&path)]);
+    let warnings = Dataset::read_any(directory.path()).unwrap().warnings;
+    assert!(warnings.len() == 1 && warnings[0].what.contains("fork.txt: changed since its capture"), "{warnings:?}");
 }
 
 #[test]
