@@ -156,13 +156,13 @@ pub(super) fn what(groups: bool) -> &'static str {
     if groups { "groups of sequences" } else { "sequences" }
 }
 
-/// So many sequences, or groups, are too few even if no name is wrong.
+/// Too few sequences, or groups, even if no name is wrong.
 fn too_few(found: u64, needed: u64, groups: bool, settings: &Settings) -> Error {
     let stop = Stop::TooFew { position: 0, found, needed };
     stop.problem(settings.rate, what(groups)).fix(more(found, groups, settings))
 }
 
-/// What to do about so few names, sequences or groups.
+/// The remedy for too few names, sequences or groups.
 fn more(found: u64, groups: bool, settings: &Settings) -> String {
     let at_best = at_best(found, settings.confidence);
     let more = match groups {

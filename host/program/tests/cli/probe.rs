@@ -119,7 +119,7 @@ fn a_directory_of_meshes_is_one_object_with_instances() {
         fs::create_dir_all(&meshes).unwrap();
         rings.into_iter().zip(["a", "b", "c"]).for_each(|(rings, name)| _ = globe(&meshes, name, rings));
     }
-    let expected = "two objects are called a … \n--instances takes each directory as one object";
+    let expected = "two objects are called a … \nIf each directory is one object, --instances takes it as such";
     fails(at, "capture meshes -o data --touches 300", 1, expected);
     let capture = "capture meshes -o data --touches 300 --instances";
     assert_eq!(figures(at, capture)["objects"].as_array().unwrap().len(), 2);
