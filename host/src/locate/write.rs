@@ -3,13 +3,11 @@
 use super::Settings;
 use super::error::LocateProblem;
 use super::surface::Surface;
-use crate::compile::{OwnedSection, file};
+use crate::compile::{self, OwnedSection, file, restated_file};
 use crate::error::Result;
 use crate::probe::approach::Probe;
 use palpate_onboard::locate::{BEYOND, DISTANCES, MAPS_LENGTH, Maps, PLACEMENT_LENGTH, WIDTHS, WITHIN};
-use palpate_shared::format::{
-    HEADER_LENGTH, Header, HeaderBuilder, Length, MAPS_LAYOUT, Promise, Section, Tag, TrainedProbe, take_section,
-};
+use palpate_shared::format::{HeaderBuilder, Length, MAPS_LAYOUT, Promise, Tag, TrainedProbe};
 
 /// 1/16 mm in a millimeter.
 const SIXTEENTHS: f64 = 16.0;
@@ -120,30 +118,20 @@ pub(super) struct Restated {
 /// [`LocateProblem::Refused`] if it could not be read then.
 pub(super) fn restated(maps: Maps<'_>, stated: &Restated) -> Result<Vec<u8>> {
     let &Restated { odds, max_touches, ref least_fits, stretch, promise } = stated;
-    let header = Header::of(maps.model());
-    let length = |length: u32| usize::try_from(length).unwrap_or(usize::MAX);
-    let rest = &maps.model()[HEADER_LENGTH..];
-    let (text, rest) = rest.split_at(length(header.text_length()));
-    let mut own = &rest[..length(header.optional_length())];
-    let mut sections = Vec::new();
-    while let Some(Section { tag, must_understand, content }) = take_section(&mut own) {
-        let mut content = content.to_vec();
-        if tag == Tag::Maps.code() {
-            content[STRETCH..STRETCH + 2].copy_from_slice(&stretch.to_le_bytes());
-            for record in content[MAPS_LENGTH..].chunks_exact_mut(PLACEMENT_LENGTH).take(maps.placements()) {
-                let least = least_fits.get(usize::from(record[0])).copied().unwrap_or(0);
-                record[PLACEMENT_LENGTH - 2..].copy_from_slice(&least.to_le_bytes());
-            }
-        }
-        if tag != Tag::Promise.code() {
-            sections.push(OwnedSection { tag, must_understand, content });
-        }
+    let mut content = maps.section(Tag::Maps).unwrap_or_default().to_vec();
+    content[STRETCH..STRETCH + 2].copy_from_slice(&stretch.to_le_bytes());
+    for record in content[MAPS_LENGTH..].chunks_exact_mut(PLACEMENT_LENGTH).take(maps.placements()) {
+        let least = least_fits.get(usize::from(record[0])).copied().unwrap_or(0);
+        record[PLACEMENT_LENGTH - 2..].copy_from_slice(&least.to_le_bytes());
     }
-    if let Some(promise) = promise {
-        sections.push(OwnedSection::new(Tag::Promise, false, promise.write(<[u8]>::to_vec)));
-    }
-    let header = HeaderBuilder::from(header).with_odds(odds).with_max_touches(max_touches);
-    let bytes = file(header, text.to_vec(), sections, Vec::new())?;
+    let promise = promise.map(|promise| (false, promise.write(<[u8]>::to_vec)));
+    let restated = compile::Restated {
+        odds: Some(odds),
+        max_touches: Some(max_touches),
+        sections: vec![(Tag::Maps, Some((true, content))), (Tag::Promise, promise)],
+        ..compile::Restated::default()
+    };
+    let bytes = restated_file(maps.model(), &restated)?;
     Maps::new(&bytes).map_err(|error| LocateProblem::Refused { error })?;
     Ok(bytes)
 }

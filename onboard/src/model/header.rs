@@ -39,20 +39,9 @@ pub(crate) fn whole(bytes: &[u8]) -> Result<(), ModelError> {
 pub(super) fn read(bytes: &[u8]) -> Result<Model<'_>, Wrong> {
     let header = Header::of(bytes);
     let mut rest = bytes.get(HEADER_LENGTH..).unwrap_or_default();
-    let objects = 8 * (usize::from(header.last_object()) + 1);
-    let length = |field: u32| usize::try_from(field).unwrap_or(usize::MAX);
     let axis_count = header.axes();
-    let lengths = [
-        length(header.text_length()),
-        length(header.optional_length()),
-        objects,
-        length(header.cuts_length()).saturating_add(4 * usize::from(axis_count)),
-        8 * usize::from(header.groups()),
-        length(header.nodes_length()),
-        length(header.leaves_length()),
-    ];
     let mut parts = [&[][..]; 7];
-    for (part, length) in parts.iter_mut().zip(lengths) {
+    for (part, length) in parts.iter_mut().zip(header.lengths()) {
         let offset = bytes.len() - rest.len();
         *part = take(&mut rest, length).ok_or(Wrong::Section(offset))?;
     }

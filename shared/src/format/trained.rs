@@ -9,75 +9,53 @@ use crate::pattern::Patterns;
 #[non_exhaustive]
 pub enum Tag {
     /// [`TrainedProbe`].
-    Probe,
+    Probe = 1,
     /// [`TrainedTouches`].
-    Touches,
+    Touches = 2,
     /// [`TrainedNoise`].
-    Noise,
+    Noise = 3,
     /// Weights of evidence by the number of touches: [`Weights`](super::Weights).
-    Weights,
+    Weights = 4,
     /// Stopping thresholds by object: [`OddsByObject`](super::OddsByObject).
-    ThresholdsByObject,
+    ThresholdsByObject = 5,
     /// A test for objects that the model does not know: [`Strangers`](super::Strangers).
-    Strangers,
+    Strangers = 6,
     /// [`Plan`](super::Plan).
-    Plan,
+    Plan = 7,
     /// The features' names and scales, for models over rows of features: see [`take_feature`].
-    FeatureNames,
+    FeatureNames = 8,
     /// [`PatternShares`].
-    PatternShares,
+    PatternShares = 9,
     /// [`Promise`](super::Promise).
-    Promise,
+    Promise = 10,
     /// [`Temperature`](super::Temperature).
-    Temperature,
+    Temperature = 11,
     /// The values of leaves that stand for many: [`SharedLeaves`](super::SharedLeaves).
-    SharedLeaves,
+    SharedLeaves = 12,
     /// Rule that turns margins of rows into a class or a value: [`Prediction`](super::Prediction).
-    Prediction,
+    Prediction = 13,
     /// Features that stand for a missing value: [`Sentinel`](super::Sentinel).
-    Sentinel,
+    Sentinel = 14,
     /// [`Fingerprints`].
-    Fingerprints,
+    Fingerprints = 15,
     /// Evidence of a row by its margins: [`RowEvidence`](super::RowEvidence).
-    RowEvidence,
+    RowEvidence = 16,
     /// Outputs that belong to one object: [`Outputs`](super::Outputs).
-    Outputs,
+    Outputs = 18,
     /// Columns of the library's rows that a model over some of them has: how many there were, and the number of each, as u32.
-    Columns,
+    Columns = 19,
     /// Maps of the heights that a fingertip meets on objects on a table, for a model of [`MAPS_LAYOUT`](super::MAPS_LAYOUT).
-    Maps,
+    Maps = 20,
     /// Feature that is the number of a row in its sequence: [`Position`](super::Position).
-    Position,
+    Position = 21,
     /// Rows that a model takes in a sequence: [`Guard`](super::Guard).
-    Guard,
+    Guard = 22,
 }
 
 impl Tag {
     /// The tag's number.
     pub const fn code(self) -> u16 {
-        match self {
-            Self::Probe => 1,
-            Self::Touches => 2,
-            Self::Noise => 3,
-            Self::Weights => 4,
-            Self::ThresholdsByObject => 5,
-            Self::Strangers => 6,
-            Self::Plan => 7,
-            Self::FeatureNames => 8,
-            Self::PatternShares => 9,
-            Self::Promise => 10,
-            Self::Temperature => 11,
-            Self::SharedLeaves => 12,
-            Self::Prediction => 13,
-            Self::Sentinel => 14,
-            Self::Fingerprints => 15,
-            Self::RowEvidence => 16,
-            Self::Outputs => 18,
-            Self::Columns => 19,
-            Self::Maps => 20,
-            Self::Position => 21,
-            Self::Guard => 22,
-        }
+        self as u16
     }
 }
 

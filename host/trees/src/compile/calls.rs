@@ -1,12 +1,14 @@
 //! Functions in C that a program calls: a row to its class, value or probabilities, and steps to a verdict, from a model that
 //! is a constant.
 
+use super::container::parts;
 use super::cost::has_sequences;
 use super::legend::Legend;
 use super::model::bound_of;
 use crate::ensemble::Probability;
 use palpate_onboard::Model;
-use palpate_shared::format::{Key, Link};
+use palpate_shared::Descriptor;
+use palpate_shared::format::{Axis, CHECKSUM_LENGTH, Key, Link, RowEvidence, Tag};
 use std::fmt::Write as _;
 
 /// A model as C calls it.
@@ -18,33 +20,6 @@ pub(super) struct Calls<'a> {
     pub(super) probability: Probability,
     /// True if its trees are code.
     pub(super) is_code: bool,
-}
-
-/// Start of the header's parts, and of its pieces with an address of their own.
-struct Places {
-    parts: Vec<usize>,
-    cuts: usize,
-}
-
-impl Places {
-    /// Places of a model that was opened.
-    fn of(bytes: &[u8]) -> Self {
-        let (short, long) = (|at| usize::from(short(bytes, at)), |at| long(bytes, at) as usize);
-        let objects = usize::from(bytes[14]) + 1;
-        let axes = 4 * short(16);
-        let lengths = [long(68), long(92), 8 * objects, long(80) + axes, 8 * short(18), long(84), long(88)];
-        let mut parts = vec![96];
-        lengths.iter().for_each(|length| parts.push(parts[parts.len() - 1] + length));
-        Self { cuts: parts[3] + axes, parts }
-    }
-}
-
-fn short(bytes: &[u8], at: usize) -> u16 {
-    u16::from_le_bytes([bytes[at], bytes[at + 1]])
-}
-
-fn long(bytes: &[u8], at: usize) -> u32 {
-    u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
 }
 
 impl Calls<'_> {
@@ -66,30 +41,17 @@ impl Calls<'_> {
 
     /// The constant, field by field as `palpate_model` declares them.
     fn opened(&self) -> String {
-        let (name, bytes) = (self.name, self.model.bytes());
-        let Places { parts, cuts } = Places::of(bytes);
-        let at = |place: usize| format!("{name}_model + {place}");
-        let mut found: [Option<usize>; 24] = [None; 24];
-        let (mut place, mut row, mut known) = (parts[1], (0, 0), self.model.object_count());
-        // Without a section of what was trained: all times, of any spread, and directions if the descriptor has them.
-        let mut trained = (0x20, u8::from(self.is_oriented()), u32::MAX);
-        while place < parts[2] {
-            let (tag, length, content) = (short(bytes, place), long(bytes, place + 4) as usize, place + 8);
-            if let Some(slot) = found.get_mut(usize::from(tag & 0x7fff)) {
-                *slot = Some(content);
-            }
-            match tag & 0x7fff {
-                2 => trained = (bytes[content], bytes[content + 2], long(bytes, content + 4)),
-                6 => known -= usize::from(bytes[content]),
-                16 => {
-                    let most = (u32::from(bytes[content + 7]) << bytes[content + 5]) - 1;
-                    row = (long(bytes, content).cast_signed(), most);
-                }
-                _ => {}
-            }
-            place = content + length.next_multiple_of(4);
-        }
-        let pointer = |tag: usize, offset: usize| found[tag].map_or_else(|| "NULL".into(), |place| at(place + offset));
+        let (name, model, header) = (self.name, self.model, self.model.header());
+        let bytes = model.bytes();
+        let parts = parts(model);
+        let checksum = &bytes[bytes.len() - CHECKSUM_LENGTH..];
+        let at = |part: &[u8]| format!("{name}_model + {}", part.as_ptr().addr() - bytes.as_ptr().addr());
+        let pointer = |part: Option<&[u8]>| part.map_or_else(|| "NULL".into(), at);
+        let section = |tag: Tag| {
+            pointer(model.optional_sections().find(|section| section.tag == tag.code()).map(|section| section.content))
+        };
+        let trained = model.trained_touches();
+        let most = |row: RowEvidence<'_>| ((row.len() as u32 - 1) << row.shifts.between) - 1;
         let code = if self.is_code { format!("{name}_code_") } else { "NULL".into() };
         format!(
             "/* The model as palpate_open leaves it: its bytes were checked when it was exported. */\n\
@@ -99,34 +61,35 @@ impl Calls<'_> {
              #if PALPATE_OUTPUTS\n    {outputs},\n#endif\n    \
              0, {spread}u, {objects}, {known}, {features}, {layout}, {leaf}, {descriptor}, {real}, {patterns}, {oriented}\n\
              #if PALPATE_LAYOUTS & PALPATE_CODE\n    , {code}\n#endif\n}};\n\n",
-            parts = parts.iter().map(|&place| at(place)).collect::<Vec<_>>().join(", "),
-            cuts = at(cuts),
-            odds = pointer(5, 0),
-            strangers = pointer(6, 0),
-            table = pointer(12, 4),
-            sentinel = pointer(14, 0),
-            weights = pointer(4, 0),
-            rows = pointer(16, 0),
-            start = row.0,
-            most = row.1,
-            position = pointer(21, 0),
-            guard = pointer(22, 0),
-            outputs = pointer(18, 0),
-            spread = trained.2,
-            objects = self.model.object_count(),
-            features = self.model.feature_count(),
-            layout = bytes[6],
-            leaf = bytes[7],
-            descriptor = bytes[12],
-            real = bytes[13],
-            patterns = trained.0,
-            oriented = trained.1,
+            parts = parts.into_iter().chain([checksum]).map(at).collect::<Vec<_>>().join(", "),
+            cuts = at(&parts[3][Axis::LENGTH * usize::from(header.axes())..]),
+            odds = section(Tag::ThresholdsByObject),
+            strangers = section(Tag::Strangers),
+            table = pointer(model.shared_leaves().map(|shared| shared.values())),
+            sentinel = section(Tag::Sentinel),
+            weights = section(Tag::Weights),
+            rows = section(Tag::RowEvidence),
+            start = model.row_evidence().map_or(0, |row| row.start),
+            most = model.row_evidence().map_or(0, most),
+            position = section(Tag::Position),
+            guard = section(Tag::Guard),
+            outputs = section(Tag::Outputs),
+            spread = trained.largest_spread,
+            objects = model.object_count(),
+            known = model.known_count(),
+            features = model.feature_count(),
+            layout = header.layout(),
+            leaf = header.leaf(),
+            descriptor = header.descriptor(),
+            real = header.key(),
+            patterns = trained.patterns.bits(),
+            oriented = u8::from(trained.needs_pose),
         )
     }
 
     /// True if the descriptor has directions.
     fn is_oriented(&self) -> bool {
-        self.model.descriptor().is_some() && 0x6c >> self.model.bytes()[12] & 1 == 1
+        self.model.descriptor().is_some_and(Descriptor::needs_pose)
     }
 
     /// Type of a row's features, and what stands for a missing one.

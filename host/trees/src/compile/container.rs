@@ -2,7 +2,9 @@
 
 use crate::error::{Error, Result, problem};
 use palpate_onboard::Model;
-use palpate_shared::format::{CHECKSUM_LENGTH, HEADER_LENGTH, HeaderBuilder, Section, Tag, checksum};
+use palpate_shared::format::{
+    CHECKSUM_LENGTH, Group, HEADER_LENGTH, Header, HeaderBuilder, Section, Tag, checksum, take_section,
+};
 
 /// An optional section of a model's file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -35,11 +37,12 @@ pub(super) struct Container {
 }
 
 impl Container {
-    /// The parts of a model, including sections that nobody knows.
-    pub(super) fn of(model: &Model<'_>) -> Self {
-        let (bytes, header) = (model.bytes(), model.header());
-        let length = |field: u32| usize::try_from(field).unwrap_or(usize::MAX);
-        let (text, rest) = bytes[HEADER_LENGTH..bytes.len() - CHECKSUM_LENGTH].split_at(length(header.text_length()));
+    /// The parts of a model that was opened, including sections that nobody knows.
+    pub(super) fn of(bytes: &[u8]) -> Self {
+        let header = Header::of(bytes);
+        let [text, optional, ..] = header.lengths();
+        let (text, rest) = bytes[HEADER_LENGTH..bytes.len() - CHECKSUM_LENGTH].split_at(text);
+        let (mut optional, content) = rest.split_at(optional);
         let owned = |Section { tag, must_understand, content }: Section<'_>| OwnedSection {
             tag,
             must_understand,
@@ -48,8 +51,8 @@ impl Container {
         Self {
             header: HeaderBuilder::from(header),
             text: text.into(),
-            sections: model.optional_sections().map(owned).collect(),
-            content: rest[length(header.optional_length())..].into(),
+            sections: std::iter::from_fn(|| take_section(&mut optional)).map(owned).collect(),
+            content: content.into(),
         }
     }
 
@@ -70,6 +73,22 @@ impl Container {
         bytes.extend(checksum(&bytes).to_le_bytes());
         Ok(bytes)
     }
+}
+
+/// The parts of a model of trees in the order of [`Header::lengths`].
+pub(super) fn parts<'m>(model: &Model<'m>) -> [&'m [u8]; 7] {
+    let mut rest = &model.bytes()[HEADER_LENGTH..];
+    model.header().lengths().map(|length| {
+        let (part, after) = rest.split_at(length);
+        rest = after;
+        part
+    })
+}
+
+/// The groups of a model, and the bytes of its splits: an open model gives margins, not trees.
+pub(super) fn groups_and_splits<'m>(model: &Model<'m>) -> (Vec<Group>, &'m [u8]) {
+    let [.., groups, splits, _] = parts(model);
+    (groups.as_chunks().0.iter().filter_map(|group| Group::from_bytes(*group)).collect(), splits)
 }
 
 /// The file of a model whose content is no trees, such as maps: margins and priors are 0.

@@ -5,7 +5,7 @@
 //! the code is that of the firmware's `verdict` image, RAM and stack are those that `evaluator` prints. All figures are of the
 //! firmware's profile (`opt-level = "s"`).
 
-use super::groups::groups_and_splits;
+use super::container::groups_and_splits;
 use palpate_onboard::Model;
 use palpate_shared::format::{Group, Layout, LeafType, Weights};
 use serde::Serialize;

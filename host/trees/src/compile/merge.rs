@@ -193,7 +193,7 @@ fn balanced<'a>(cuts: &[i32], values: &[f32], feature: u8, missing_left: bool, o
 
 #[cfg(test)]
 mod tests {
-    use super::super::groups::groups_and_splits;
+    use super::super::container::groups_and_splits;
     use super::super::{Leaf, Settings, compile, open};
     use crate::compile::code::tests::Numbers;
     use crate::ensemble::{Ensemble, Inputs, Node, Output, Provenance, Tree};

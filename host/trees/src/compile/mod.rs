@@ -44,7 +44,6 @@ mod container;
 mod cost;
 mod emit;
 mod forest;
-mod groups;
 mod legend;
 mod lower;
 mod lowered;
@@ -68,7 +67,7 @@ pub use legend::label_numbers;
 pub(crate) use merge::Source;
 pub use model::{CompiledModel, bound_of, names, open, thresholds};
 pub use palpate_shared::format::{Layout, LeafType as Leaf};
-pub use restate::{Restated, RestatedSection, restate};
+pub use restate::{Restated, RestatedSection, restate, restated_file};
 pub use share::different_leaves;
 
 use crate::ensemble::{Ensemble, Probability};

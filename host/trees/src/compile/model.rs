@@ -1,8 +1,9 @@
 //! Compiled models, opened.
 
+use super::container::parts;
 use crate::error::{Error, Place, Result, problem};
 use palpate_onboard::{Model, ModelError};
-use palpate_shared::format::{Axis, HEADER_LENGTH, Header, Layout, MAGIC, MAPS_LAYOUT};
+use palpate_shared::format::{Axis, Header, Layout, MAGIC, MAPS_LAYOUT};
 use std::path::{Path, PathBuf};
 
 /// A compiled model that was checked: its bytes, and the file that they came from.
@@ -128,18 +129,13 @@ pub fn names(model: &Model<'_>) -> Vec<String> {
 
 /// The thresholds of all features together, as the chip compares them.
 pub fn thresholds(model: &Model<'_>) -> Vec<i32> {
-    let header = model.header();
-    let length = |field: u32| usize::try_from(field).unwrap_or(usize::MAX);
-    let base_start = HEADER_LENGTH + length(header.text_length()) + length(header.optional_length());
-    let axes_start = base_start + 8 * model.object_count();
-    let cuts_start = axes_start + Axis::LENGTH * usize::from(header.axes());
-    let section = |start: usize, end: usize| model.bytes().get(start..end).unwrap_or_default();
-    let mut cuts = section(cuts_start, cuts_start + length(header.cuts_length()));
+    let [_, _, _, axes, ..] = parts(model);
+    let (axes, mut cuts) = axes.split_at(Axis::LENGTH * usize::from(model.header().axes()));
     if model.layout() == Layout::Wide {
         return cuts.as_chunks().0.iter().map(|cut| i32::from_le_bytes(*cut)).collect();
     }
     let mut thresholds = Vec::new();
-    for axis in section(axes_start, cuts_start).as_chunks().0.iter().filter_map(|axis| Axis::from_bytes(*axis)) {
+    for axis in axes.as_chunks().0.iter().filter_map(|axis| Axis::from_bytes(*axis)) {
         let Some((own, rest)) = cuts.split_at_checked(axis.cuts_length()) else { break };
         cuts = rest;
         let number = |bytes: &[u8]| {

@@ -1,6 +1,6 @@
 //! Equal leaves once: what stands for a leaf is its number in a table.
 
-use super::groups::groups_and_splits;
+use super::container::groups_and_splits;
 use super::parts::Parts;
 use palpate_onboard::Model;
 use palpate_shared::format::{Group, LeafType, SECTION_HEADER_LENGTH, SharedLeaves};

@@ -1,7 +1,6 @@
 //! Boxes of rows: for each feature an interval of keys, and whether a missing value is in it.
 
-use super::numbers::Numbers;
-use crate::ensemble::{Ensemble, Node, Output, Threshold};
+use crate::ensemble::Threshold;
 use crate::error::{Error, Result, problem};
 use palpate_shared::format::f32_key;
 
@@ -199,7 +198,7 @@ impl Keys {
     }
 
     /// The smallest key that is not below a threshold.
-    fn cut(&self, feature: usize, threshold: Threshold) -> i64 {
+    pub(super) fn cut(&self, feature: usize, threshold: Threshold) -> i64 {
         // `as` keeps what is beyond an i32 at its limits.
         let whole = |number: f64| i64::from((number.ceil() as i32).max(-i32::MAX));
         match self {
@@ -210,30 +209,6 @@ impl Keys {
             Self::Scaled(scales) => whole(threshold.units(scales.get(feature).copied().unwrap_or(1.0))),
         }
     }
-}
-
-/// The ensemble's trees over keys, with the library's margins in their leaves.
-///
-/// # Errors
-/// Errors of [`Tree::new`].
-pub(super) fn of_ensemble(ensemble: &Ensemble, numbers: &Numbers<'_>, keys: &Keys) -> Result<Vec<Tree>> {
-    let step = |number: usize, index: usize, node: &Node| match node {
-        Node::Leaf(_) => Step::Leaf(numbers.leaf(number, index)),
-        &Node::Split { feature, threshold, missing_left, left, right } => {
-            let own = ensemble.threshold(number, index).unwrap_or(Threshold::below(threshold.into()));
-            let own = if *keys == Keys::Real { Threshold::below(threshold.into()) } else { own };
-            Step::Split(Rule { feature, cut: keys.cut(feature, own), missing_left }, [left, right])
-        }
-    };
-    let tree = |(number, tree): (usize, &crate::ensemble::Tree)| {
-        let nodes = tree.nodes.iter().enumerate().map(|(index, node)| step(number, index, node)).collect();
-        let object = match tree.output {
-            Output::One(object) => Some(object),
-            Output::Each => None,
-        };
-        Tree::new(nodes, object)
-    };
-    ensemble.trees.iter().enumerate().map(tree).collect()
 }
 
 /// Thresholds of a feature, as keys.

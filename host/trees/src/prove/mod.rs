@@ -22,7 +22,7 @@ use crate::compile::{self, Instructions, Source};
 use crate::ensemble::{Ensemble, Inputs};
 use crate::error::{Error, Result, problem};
 use crate::rows::{Encoder, missing_text};
-use boxes::{Keys, Rows, Tree, Values, of_ensemble};
+use boxes::{Keys, Rows, Tree, Values};
 use format::Plain;
 use numbers::Numbers;
 use palpate_onboard::Model;
@@ -80,7 +80,7 @@ pub fn prove(bytes: &[u8], ensemble: &Ensemble) -> Result<Proof> {
     let plain = format::read(bytes)?;
     statements(&plain, ensemble)?;
     let numbers = Numbers::new(&plain, ensemble);
-    let (sources, base) = (of_ensemble(ensemble, &numbers, &plain.keys)?, numbers.base());
+    let (sources, base) = (numbers.trees()?, numbers.base());
     let subject = Subject { model, plain: &plain, sources: &sources, base: &base, ensemble };
     let found = trees::compare(subject, &plain.order(ensemble, model.leaf_type())?)?;
     let mut proof = subject.proof(&found);

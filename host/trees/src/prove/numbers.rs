@@ -1,7 +1,9 @@
 //! The ensemble's numbers as a model's margins have them.
 
+use super::boxes::{Keys, Rule, Step, Tree};
 use super::format::Plain;
-use crate::ensemble::Ensemble;
+use crate::ensemble::{Ensemble, Node, Output, Threshold};
+use crate::error::Result;
 
 /// Leaves and base margins of an ensemble. Where the model states a scale and an offset for each output, leaves have the middle
 /// between their tree's least and largest taken out, and every output is in the scale of the largest.
@@ -18,6 +20,31 @@ impl<'n> Numbers<'n> {
             |tree| ensemble.ranges(tree).into_iter().map(|[least, most]| f64::midpoint(least, most)).collect();
         let trees = if plain.scales.is_empty() { 0 } else { ensemble.trees.len() };
         Self { plain, ensemble, middles: (0..trees).map(middles).collect() }
+    }
+
+    /// The ensemble's trees over keys, with the library's margins in their leaves.
+    ///
+    /// # Errors
+    /// Errors of [`Tree::new`].
+    pub(super) fn trees(&self) -> Result<Vec<Tree>> {
+        let Self { plain: Plain { keys, .. }, ensemble, .. } = self;
+        let step = |number: usize, index: usize, node: &Node| match node {
+            Node::Leaf(_) => Step::Leaf(self.leaf(number, index)),
+            &Node::Split { feature, threshold, missing_left, left, right } => {
+                let own = ensemble.threshold(number, index).unwrap_or(Threshold::below(threshold.into()));
+                let own = if *keys == Keys::Real { Threshold::below(threshold.into()) } else { own };
+                Step::Split(Rule { feature, cut: keys.cut(feature, own), missing_left }, [left, right])
+            }
+        };
+        let tree = |(number, tree): (usize, &crate::ensemble::Tree)| {
+            let nodes = tree.nodes.iter().enumerate().map(|(index, node)| step(number, index, node)).collect();
+            let object = match tree.output {
+                Output::One(object) => Some(object),
+                Output::Each => None,
+            };
+            Tree::new(nodes, object)
+        };
+        ensemble.trees.iter().enumerate().map(tree).collect()
     }
 
     /// The values of a leaf; none of a split.
