@@ -2,7 +2,6 @@
 
 pub use crate::calibrate::error::*;
 pub use crate::capture::error::*;
-pub use crate::chip::error::*;
 #[cfg(feature = "train")]
 pub use crate::ensemble::train::error::*;
 pub use crate::evaluate::error::*;

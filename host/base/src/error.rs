@@ -75,6 +75,8 @@ pub enum Kind {
     Cancelled,
     /// Standard output was closed by its reader (`palpate … | head`): not an error for the user.
     Closed,
+    /// The line to a chip broke, nobody is there, or the chip is silent or was reset: it may come back.
+    Lost,
 }
 
 /// A problem as a value: where it is, what is wrong, what to do. It is made where it arises:
