@@ -1,5 +1,4 @@
 //! Errors, with the place and a remedy. Each room has its own problems; one error holds any of them, and the place.
 
-pub use crate::chip::error::*;
 pub use crate::locate::error::*;
 pub use palpate_simulator::error::*;

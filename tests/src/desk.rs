@@ -4,8 +4,8 @@ use embedded_io::{ErrorKind, ErrorType, Read, Write};
 use palpate_onboard::{Model, Recognizer, Refused, Stopping, Verdict};
 use palpate_shared::Touch;
 use palpate_shared::link::{
-    CHUNK, Command, Decision, Detail, HostEnd, HostSettings, Incoming, LinkError, Outcome, Query, Refusal,
-    VerdictMessage, checksum,
+    Answer, CHUNK, Decision, Detail, HostEnd, HostSettings, Incoming, LinkError, Refusal, Request, VerdictMessage,
+    checksum,
 };
 use rand::rngs::ChaCha8Rng;
 use rand::{Rng, RngExt, SeedableRng};
@@ -38,23 +38,33 @@ impl embedded_io::Error for PowerCut {
 /// Something for the host to say.
 #[derive(Clone, Debug)]
 pub enum Step {
-    /// Give a command.
-    Do(Command<'static>),
-    /// Ask a question.
-    Ask(Query),
+    /// Asks or tells something.
+    Ask(Request<'static>),
+    /// Loads these bytes, announced under this checksum.
+    Load(&'static [u8], u32),
+}
+
+/// A load under way.
+#[derive(Clone, Copy)]
+struct Loading {
+    bytes: &'static [u8],
+    /// Offset of the next chunk; none before the chip has said which is the first.
+    next: Option<usize>,
 }
 
 /// The host with its script, as the chip's transport: what the chip reads is what the host has to say. One thread.
 pub struct Desk {
     /// The host's end of the link.
     pub host: HostEnd,
-    /// Steps that it has still to send.
+    /// Steps that it has still to take.
     pub script: VecDeque<Step>,
     /// Bytes on the line.
     pub to_chip: VecDeque<u8>,
-    /// Outcomes of all commands, in order.
-    pub outcomes: Vec<Outcome>,
-    /// To all questions, in order.
+    /// Answers to touches, in order.
+    pub verdicts: Vec<Result<VerdictMessage, Refusal>>,
+    /// The result of each load.
+    pub loads: Vec<Result<(), Refusal>>,
+    /// Answers to all else, in order.
     pub answers: Vec<String>,
     /// The session is open.
     pub open: bool,
@@ -68,12 +78,9 @@ pub struct Desk {
     pub may_fail: bool,
     /// Error that ended the session.
     pub failed: Option<LinkError>,
-    /// Commands without an outcome so far.
-    given: VecDeque<Command<'static>>,
-    /// Chunks since the last beginning.
-    chunks: Vec<Command<'static>>,
-    /// Outcomes to come that do not count: the load goes on from an earlier chunk.
-    passed_over: usize,
+    loading: Option<Loading>,
+    /// The request under way is a touch.
+    is_touch: bool,
     /// Offsets from which the chip had loads go on.
     pub continued: Vec<u32>,
     /// Off once the power is gone: nothing is read or written then.
@@ -87,7 +94,8 @@ impl Desk {
             host: HostEnd::new(HostSettings { retry: 1_000, attempts: 1_000 }),
             script: script.into_iter().collect(),
             to_chip: VecDeque::new(),
-            outcomes: Vec::new(),
+            verdicts: Vec::new(),
+            loads: Vec::new(),
             answers: Vec::new(),
             open: false,
             now: 0,
@@ -95,9 +103,8 @@ impl Desk {
             cut_every,
             may_fail: false,
             failed: None,
-            given: VecDeque::new(),
-            chunks: Vec::new(),
-            passed_over: 0,
+            loading: None,
+            is_touch: false,
             continued: Vec::new(),
             power: Rc::new(Cell::new(true)),
         };
@@ -109,51 +116,59 @@ impl Desk {
         desk
     }
 
+    /// Says the next thing, once the one before is answered.
     fn talk(&mut self) {
-        let Self { host, script, to_chip, now, given, chunks, .. } = self;
-        while let Some(step) = script.front() {
-            let said = match step {
-                Step::Do(_) if matches!(given.back(), Some(Command::Begin { .. } | Command::Commit)) => false,
-                Step::Do(command) => host.submit(command.clone(), *now, |bytes| to_chip.extend(bytes)).is_some(),
-                Step::Ask(query) => host.is_idle() && host.ask(*query, *now, |bytes| to_chip.extend(bytes)),
-            };
-            if !said {
-                break;
-            }
-            let Some(Step::Do(command)) = script.pop_front() else { continue };
-            match command {
-                Command::Begin { .. } => chunks.clear(),
-                Command::Chunk { .. } => chunks.push(command.clone()),
-                _ => {}
-            }
-            given.push_back(command);
+        let Self { host, script, to_chip, now, loading, is_touch, .. } = self;
+        if !host.is_idle() {
+            return;
         }
+        let request = match *loading {
+            Some(Loading { bytes, next }) => {
+                let next = next.expect("the chip says where a load begins");
+                let bytes = &bytes[next..];
+                Request::Chunk { offset: next as u32, bytes: &bytes[..bytes.len().min(CHUNK)] }
+            }
+            None => match script.pop_front() {
+                None => return,
+                Some(Step::Ask(request)) => request,
+                Some(Step::Load(bytes, checksum)) => {
+                    *loading = Some(Loading { bytes, next: None });
+                    Request::Begin { length: bytes.len() as u32, checksum }
+                }
+            },
+        };
+        *is_touch = matches!(request, Request::Touch { .. } | Request::Press { .. });
+        host.request(request, *now, |bytes| to_chip.extend(bytes));
     }
 
-    /// Takes an outcome, unless it is of a chunk that comes again.
-    fn hear(&mut self, outcome: Outcome) {
-        self.given.pop_front();
-        if self.passed_over > 0 {
-            self.passed_over -= 1;
-        } else if let Outcome::Continue { offset: from } = outcome {
-            self.continued.push(from);
-            let is_again = |command: &Command<'_>| matches!(command, Command::Chunk { offset, .. } if *offset >= from);
-            while matches!(self.script.front(), Some(Step::Do(Command::Chunk { offset, .. })) if *offset < from) {
-                self.script.pop_front();
+    fn hear(&mut self, answer: Answer<'_>) {
+        match (self.loading, answer) {
+            (Some(_), Answer::Refused(refusal)) => {
+                self.loading = None;
+                self.loads.push(Err(refusal));
             }
-            let again = self.chunks.extract_if(.., |command| is_again(command));
-            let commit = self.given.iter().filter(|command| **command == Command::Commit).cloned();
-            let again: Vec<_> = again.chain(commit).map(Step::Do).collect();
-            again.into_iter().rev().for_each(|step| self.script.push_front(step));
-            self.passed_over = self.given.len();
-        } else {
-            self.outcomes.push(outcome);
+            (Some(Loading { bytes, next }), Answer::Wanted { offset }) => {
+                let expected = next.map_or(0, |next| bytes.len().min(next + CHUNK));
+                if offset as usize != expected {
+                    self.continued.push(offset);
+                    assert!(self.continued.len() < 1_000, "the load goes on for ever");
+                }
+                self.loading = Some(Loading { bytes, next: Some(offset as usize) });
+                if offset as usize == bytes.len() {
+                    self.loading = None;
+                    self.loads.push(Ok(()));
+                }
+            }
+            (None, Answer::Verdict(verdict)) => self.verdicts.push(Ok(verdict)),
+            (None, Answer::Refused(refusal)) if self.is_touch => self.verdicts.push(Err(refusal)),
+            (None, answer) => self.answers.push(format!("{answer:?}")),
+            (Some(_), answer) => panic!("{answer:?} to a part of a model"),
         }
     }
 
     /// True once everything was sent and answered.
     pub fn is_done(&self) -> bool {
-        self.open && self.script.is_empty() && self.host.is_idle()
+        self.open && self.script.is_empty() && self.loading.is_none() && self.host.is_idle()
     }
 }
 
@@ -204,20 +219,21 @@ impl Write for Desk {
             self.power.set(false);
             return self.alive().map(|()| 0);
         }
-        let Self { host, to_chip, answers, open, now, .. } = self;
-        let mut outcomes = Vec::new();
+        // What an answer says is taken once the host is no longer borrowed.
+        let mut host = std::mem::replace(&mut self.host, HostEnd::new(HostSettings::default()));
+        let (now, mut sent) = (self.now, Vec::new());
         host.receive(
             buffer,
-            *now,
-            |bytes| to_chip.extend(bytes),
+            now,
+            |bytes| sent.extend_from_slice(bytes),
             |incoming| match incoming {
-                Incoming::Opened => *open = true,
-                Incoming::Outcome { outcome, .. } => outcomes.push(outcome),
-                Incoming::Answer(answer) => answers.push(format!("{answer:?}")),
-                Incoming::Event { .. } => {}
+                Incoming::Opened => self.open = true,
+                Incoming::Answer(answer) => self.hear(answer),
+                Incoming::Event { .. } | Incoming::Stranger => {}
             },
         );
-        outcomes.into_iter().for_each(|outcome| self.hear(outcome));
+        self.host = host;
+        self.to_chip.extend(sent);
         Ok(buffer.len())
     }
 
@@ -228,22 +244,16 @@ impl Write for Desk {
 
 /// Sends a touch.
 pub fn push(touch: &Touch) -> Step {
-    Step::Do(Command::Touch { touch: touch.into(), detail: true })
+    Step::Ask(Request::Touch { touch: touch.into(), detail: true })
 }
 
 /// Sends a model.
-pub fn load(bytes: &'static [u8]) -> Vec<Step> {
-    let begin = Command::Begin { length: bytes.len() as u32, checksum: checksum(bytes) };
-    let mut steps = vec![Step::Do(begin)];
-    for (i, bytes) in bytes.chunks(CHUNK).enumerate() {
-        steps.push(Step::Do(Command::Chunk { offset: (i * CHUNK) as u32, bytes }));
-    }
-    steps.push(Step::Do(Command::Commit));
-    steps
+pub fn load(bytes: &'static [u8]) -> Step {
+    Step::Load(bytes, checksum(bytes))
 }
 
-/// Outcomes of a recognizer for these touches.
-pub fn expected(bytes: &[u8], touches: &[Touch]) -> Vec<Outcome> {
+/// Answers of a recognizer to these touches.
+pub fn expected(bytes: &[u8], touches: &[Touch]) -> Vec<Result<VerdictMessage, Refusal>> {
     let model = Model::new(bytes).unwrap();
     let mut recognizer = Recognizer::<OBJECTS>::new(&model, Stopping::from_model(&model)).unwrap();
     let verdict = |touch| {
@@ -252,24 +262,14 @@ pub fn expected(bytes: &[u8], touches: &[Touch]) -> Vec<Outcome> {
             Ok(Verdict::Recognized { object, .. }) => Decision::Recognized(object),
             Ok(Verdict::Unknown) => Decision::Unknown,
             Ok(Verdict::GaveUp) => Decision::GaveUp,
-            Err(Refused::Pattern(_)) => return Outcome::Refused(Refusal::Pattern),
-            Err(Refused::Spread) => return Outcome::Refused(Refusal::Spread),
+            Err(Refused::Pattern(_)) => return Err(Refusal::Pattern),
+            Err(Refused::Spread) => return Err(Refusal::Spread),
             Err(refused) => panic!("{refused}"),
         };
         let best = recognizer.best();
         let detail = Some(Detail::new(recognizer.posterior(best).q56(), recognizer.evidence()));
         let touches = recognizer.touches();
-        Outcome::Verdict(VerdictMessage { decision, best: best as u8, touches, detail })
+        Ok(VerdictMessage { decision, best: best as u8, touches, detail })
     };
     touches.iter().map(verdict).collect()
-}
-
-/// Outcomes of touches, counted or not.
-pub fn answers_to_touches(desk: &Desk) -> Vec<Outcome> {
-    let is_answer = |outcome: &&Outcome| match outcome {
-        Outcome::Verdict(_) => true,
-        Outcome::Refused(refusal) => refusal.is_of_a_touch(),
-        _ => false,
-    };
-    desk.outcomes.iter().filter(is_answer).copied().collect()
 }

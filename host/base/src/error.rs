@@ -87,6 +87,8 @@ pub enum Kind {
     Closed,
     /// A place that is written to holds something else.
     Exists,
+    /// The line to a chip broke, nobody is there, or the chip is silent or was reset: it may come back.
+    Lost,
     /// Margins of a library do not belong to the rows or the outputs of the model that is compared with them.
     Margins,
     /// A promise is not kept: too many are wrong at every threshold that was tested.

@@ -56,7 +56,7 @@ impl Instructions {
     pub(super) fn explanation(self) -> String {
         let measured = "counted while emulated chips ran the compiled models";
         let chip = if self.m4f.measured { Chip::M0Plus } else { Chip::M4F };
-        let missing = chip.obstacle().map_or_else(String::new, |problem| format!("{problem}; "))
+        let missing = chip.obstacle().map_or_else(String::new, |problem| format!("{}; ", problem.what()))
             + "onboard/firmware says how to build what is needed";
         let m0_plus = "the compiler's estimate";
         match (self.m4f.measured, self.m0_plus.measured) {

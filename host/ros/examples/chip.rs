@@ -41,7 +41,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                     Err(refusal) => Event::Refused { touch: TouchMessage::from(&touch), refusal },
                 };
                 if matches!(event, Event::Touch { verdict, .. } if verdict.decision != Decision::Undecided) {
-                    Device::reset(&mut station);
+                    let _ = Device::reset(&mut station);
                 }
                 end.tell(event, &mut send);
             }

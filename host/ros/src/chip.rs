@@ -1,15 +1,14 @@
 //! A chip that recognizes by itself, behind a thread: orders in, reports out.
 
 use crate::decide::{behind, with_best};
-use crate::follow::{Step, UNDECIDED};
+use crate::follow::Step;
 use crate::wire::{Approach, Evidence, Verdict, unit_vectors};
 use async_channel::{Receiver, Sender, TryRecvError};
-use palpate::chip::{ChipModel, Connection, Emulator, Port, Received, probability};
+use palpate::Result;
+use palpate::chip::{ChipModel, Connection, Emulator, Port, probability};
 use palpate::compile::CompiledModel;
-use palpate::error::ChipProblem;
 use palpate::onboard::shared::Touch;
-use palpate::onboard::shared::link::{Command, Decision, Event, HostSettings, Outcome, VerdictMessage};
-use palpate::{Error, Result};
+use palpate::onboard::shared::link::{Decision, Event, HostSettings, VerdictMessage};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -51,8 +50,7 @@ pub(crate) fn start(port: Port, baud: u32, load: Option<Arc<CompiledModel>>) -> 
     let (orders, taken) = async_channel::unbounded();
     let (said, heard) = async_channel::unbounded();
     std::thread::spawn(move || {
-        let mut line =
-            Line { port, baud, said, load, plans: true, answered: false, under_way: 0, decided: false, unasked: false };
+        let mut line = Line { port, baud, said, load, plans: true, answered: false, decided: false };
         let (mut connection, mut told) = (None, None);
         while !taken.is_closed() {
             match line.open(&mut connection).and_then(|connection| line.serve(connection, &taken)) {
@@ -82,12 +80,8 @@ struct Line {
     plans: bool,
     /// Since the last loss.
     answered: bool,
-    /// Commands without an outcome.
-    under_way: usize,
     /// A touch from here has decided: the next one is of another object.
     decided: bool,
-    /// A reset is under way that makes it so.
-    unasked: bool,
 }
 
 impl Line {
@@ -99,90 +93,76 @@ impl Line {
     /// Opens a session; after the line broke it goes on with the one before, so that no event is taken twice.
     fn open<'c>(&self, before: &'c mut Option<Connection>) -> Result<&'c mut Connection> {
         let transport = self.port.open(self.baud, &Emulator::default())?;
-        if let Some(connection) = before {
-            connection.reopen(transport)?;
-        } else {
-            *before = Some(Connection::open(transport, HostSettings::default())?);
-        }
-        before.as_mut().ok_or_else(|| ChipProblem::UnexpectedAnswer.into())
+        Ok(match before {
+            Some(connection) => {
+                connection.reopen(transport)?;
+                connection
+            }
+            None => before.insert(Connection::open(transport, HostSettings::default())?),
+        })
     }
 
     /// Talks until nobody gives orders any more.
     fn serve(&mut self, connection: &mut Connection, orders: &Receiver<Order>) -> Result<()> {
-        (self.under_way, self.decided, self.unasked) = (0, false, false);
+        self.decided = false;
         let mut model = self.model(connection)?;
         loop {
-            // One touch at a time: questions to the chip must be about this one.
-            if self.under_way == 0 {
-                match orders.try_recv() {
-                    Ok(Order::Touch(touch)) => {
-                        if std::mem::take(&mut self.decided) {
-                            self.submit(connection, Command::Reset)?;
-                            self.unasked = true;
-                        }
-                        self.submit(connection, Command::Touch { touch: (&touch).into(), detail: true })?;
-                    }
-                    Ok(Order::Reset) => {
-                        self.decided = false;
-                        self.submit(connection, Command::Reset)?;
-                    }
-                    Ok(Order::Load(load)) => {
-                        self.load = Some(load);
-                        model = self.model(connection)?;
-                    }
-                    Err(TryRecvError::Empty) => {}
-                    Err(TryRecvError::Closed) => return Ok(()),
+            match orders.try_recv() {
+                Ok(Order::Touch(touch)) => self.touch(connection, &model.names, &touch)?,
+                Ok(Order::Reset) => {
+                    self.decided = false;
+                    connection.reset()?;
+                    self.tell_before(connection, &model.names)?;
                 }
+                Ok(Order::Load(load)) => {
+                    self.load = Some(load);
+                    model = self.model(connection)?;
+                }
+                Err(TryRecvError::Empty) => {}
+                Err(TryRecvError::Closed) => return Ok(()),
             }
-            if let Some(received) = connection.hear(PATIENCE)? {
-                self.take(connection, &model.names, received)?;
+            let Some((event, missed)) = connection.hear(PATIENCE)? else { continue };
+            if missed > 0 {
+                self.tell(ChipEvent::Fault(format!("{missed} reports of the chip were lost on the way")));
             }
+            if event == Event::Started {
+                // Perhaps with another model.
+                self.decided = false;
+                model = self.model(connection)?;
+            }
+            self.take_event(connection, &model.names, event)?;
         }
     }
 
-    fn submit(&mut self, connection: &mut Connection, command: Command<'_>) -> Result<()> {
-        // There is room: at most two are under way.
-        self.under_way += usize::from(connection.submit(command)?);
+    /// Has the chip count a touch. The verdict of the object before stays the last word until then.
+    fn touch(&mut self, connection: &mut Connection, names: &[String], touch: &Touch) -> Result<()> {
+        if std::mem::take(&mut self.decided) {
+            connection.reset()?;
+        }
+        match connection.touch(touch)? {
+            Ok(verdict) => {
+                let step = self.step(connection, names, &verdict)?;
+                self.decided = step.is_decided();
+                self.tell(ChipEvent::Step(None, step.into()));
+            }
+            Err(refusal) => self.tell(ChipEvent::Refused(None, refusal.to_string())),
+        }
         Ok(())
     }
 
     /// The chip's model, which is loaded if it has another one than it should have.
     fn model(&mut self, connection: &mut Connection) -> Result<ChipModel> {
         if let Some(load) = &self.load {
-            let is_there = connection.model().is_ok_and(|model| model.info.checksum == load.model().checksum());
+            let is_there = connection.model()?.is_some_and(|model| model.info.checksum == load.model().checksum());
             if !is_there {
                 connection.load(load.bytes(), &())?;
             }
         }
-        let model = connection.model()?;
+        let model = connection.must_have_model()?;
         (self.plans, self.answered) = (true, true);
         self.tell(ChipEvent::Connected(model.names.clone()));
         self.tell_before(connection, &model.names)?;
         Ok(model)
-    }
-
-    fn take(&mut self, connection: &mut Connection, names: &[String], received: Received) -> Result<()> {
-        if matches!(received, Received::Outcome(_)) {
-            self.under_way = self.under_way.saturating_sub(1);
-        }
-        match received {
-            Received::Outcome(Outcome::Verdict(verdict)) => {
-                let step = self.step(connection, names, &verdict)?;
-                self.decided = step.is_decided();
-                self.tell(ChipEvent::Step(None, step.into()));
-            }
-            Received::Outcome(Outcome::Refused(refusal)) => self.tell(ChipEvent::Refused(None, refusal.to_string())),
-            // Of a reset that nobody ordered: the verdict stays the last word until the next touch.
-            Received::Outcome(_) if std::mem::take(&mut self.unasked) => {}
-            Received::Outcome(_) => self.tell_before(connection, names)?,
-            Received::Event(event, missed) => {
-                if missed > 0 {
-                    self.tell(ChipEvent::Fault(format!("{missed} reports of the chip were lost on the way")));
-                }
-                self.take_event(connection, names, event)?;
-            }
-        }
-        Ok(())
     }
 
     fn take_event(&mut self, connection: &mut Connection, names: &[String], event: Event) -> Result<()> {
@@ -223,14 +203,13 @@ impl Line {
         step.verdict.objects = names.to_vec();
         step.verdict = with_best(step.verdict, message.best.into(), posteriors);
         if self.plans && !step.is_decided() {
-            match connection.next_approach() {
+            match connection.next_approach()? {
                 Ok(approach) => {
                     let (direction, alignment) = unit_vectors(&approach.middle());
                     let score = f64::from(approach.score) / f64::from(1 << 15);
                     step.approach = Some(Approach { touch, pose: approach.pose, direction, alignment, score });
                 }
-                Err(error) if is_refused(&error) => self.plans = false,
-                Err(error) => return Err(error),
+                Err(_) => self.plans = false,
             }
         }
         Ok(step)
@@ -245,12 +224,7 @@ impl Line {
 
 /// A verdict as the chip says it.
 fn spoken(names: &[String], message: &VerdictMessage) -> Step {
-    let verdict = match message.decision {
-        Decision::Recognized(_) => "recognized",
-        Decision::Unknown => "unknown",
-        Decision::GaveUp => "gave-up",
-        _ => UNDECIDED,
-    };
+    let verdict = message.decision.name();
     let object = match message.decision {
         Decision::Recognized(object) => object,
         _ => message.best,
@@ -261,8 +235,4 @@ fn spoken(names: &[String], message: &VerdictMessage) -> Step {
         verdict.posterior = message.detail.map_or(f64::NAN, |detail| probability(detail.posterior()));
     }
     Step { verdict, ..Step::default() }
-}
-
-fn is_refused(error: &Error) -> bool {
-    matches!(error.problem(), Some(ChipProblem::Refused(_)))
 }

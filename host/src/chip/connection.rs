@@ -1,12 +1,13 @@
 //! A session with a chip.
 
 use super::Transport;
-use crate::error::{ChipProblem, Error, Place, Result};
+use crate::error::{Error, Kind, Place, Result, problem};
+use crate::locate::{Approach, Pose};
 use crate::progress::{self, Progress};
-use palpate_onboard::locate::{Approach, Pose};
+use palpate_shared::Touch;
 use palpate_shared::link::{
-    Answer, ApproachMessage, CHUNK, Command, Event, HostEnd, HostSettings, HostStatistics, Incoming, ModelInfo,
-    Outcome, POSE_BYTES, Query, Refusal, Statistics, checksum,
+    Answer, ApproachMessage, CHUNK, Event, HostEnd, HostSettings, HostStatistics, Incoming, LinkError, ModelInfo,
+    POSE_BYTES, PlaceMessage, Refusal, Request, Statistics, VERSION, VerdictMessage, checksum,
 };
 use std::collections::VecDeque;
 use std::hash::{BuildHasher, Hasher, RandomState};
@@ -15,28 +16,8 @@ use std::time::{Duration, Instant};
 /// Times that a chip may have a load go on from an earlier byte: memory that is worn out would have it go on forever.
 const CONTINUED: u32 = 20;
 
-/// Message of a chip, by itself or about a command.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Received {
-    /// The outcome of a command, in the commands' order.
-    Outcome(Outcome),
-    /// Something that happened on the chip by itself, and how many events before it were lost.
-    Event(Event, u32),
-}
-
-#[derive(Clone, Debug, PartialEq, Eq)]
-enum Reply {
-    Model(ModelInfo),
-    Name(String),
-    Statistics(Statistics),
-    Posteriors(Vec<u64>),
-    NextApproach(ApproachMessage),
-    Place(bool, Option<Pose>),
-    NextPress(Approach),
-    Program(String),
-    Refused(Refusal),
-    Other,
-}
+/// Time after which it is looked whether a request has to be sent again.
+const TICK: Duration = Duration::from_millis(20);
 
 /// A model as the chip describes it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -49,17 +30,16 @@ pub struct ChipModel {
     pub placements: Vec<String>,
 }
 
-/// A session with a chip.
+/// A session with a chip. What it is asked or told, it answers before the call returns; a [`Refusal`] is an answer too.
 pub struct Connection {
     end: HostEnd,
     transport: Transport,
     started: Instant,
-    /// Items heard and not handed out yet; of events also the boot number of the start that they are of.
-    heard: VecDeque<(Received, u32)>,
-    reply: Option<Reply>,
-    open: bool,
-    /// Checksum of the model that [`Connection::model`] described, and the boot number of the chip at that time.
-    model: Option<(u32, u32)>,
+    /// Events that are not handed out yet, and how many were lost before each.
+    heard: VecDeque<(Event, u32)>,
+    is_open: bool,
+    /// True if the chip may have been reset.
+    is_doubtful: bool,
 }
 
 impl Connection {
@@ -73,14 +53,10 @@ impl Connection {
             transport,
             started: Instant::now(),
             heard: VecDeque::new(),
-            reply: None,
-            open: false,
-            model: None,
+            is_open: false,
+            is_doubtful: false,
         };
         connection.connect()?;
-        let boot = connection.end.boot();
-        // What the line still held of an earlier start is nobody's.
-        connection.heard.retain(|(received, of)| !matches!(received, Received::Event(..)) || *of == boot);
         Ok(connection)
     }
 
@@ -90,17 +66,18 @@ impl Connection {
     /// # Errors
     /// When the chip does not answer.
     pub fn reopen(&mut self, transport: Transport) -> Result<()> {
-        (self.transport, self.reply, self.open) = (transport, None, false);
+        self.transport = transport;
         self.connect()
     }
 
     fn connect(&mut self) -> Result<()> {
+        (self.is_open, self.is_doubtful) = (false, false);
         let now = self.now();
         let mut sent = Ok(());
         self.end.connect(session(), now, |bytes| sent = self.transport.send(bytes));
         sent?;
-        while !self.open {
-            self.exchange(Duration::from_millis(20))?;
+        while !self.is_open {
+            self.exchange(TICK, |_| ())?.map_err(|error| self.ended(error))?;
         }
         Ok(())
     }
@@ -119,72 +96,11 @@ impl Connection {
         self.end.statistics()
     }
 
-    /// True if every command has its outcome.
-    pub fn is_idle(&self) -> bool {
-        self.end.is_idle()
-    }
-
-    /// True if [`Connection::submit`] would take a command at once.
-    pub fn has_room(&self) -> bool {
-        self.end.has_room()
-    }
-
-    /// Sends a command if there is room for it, and says whether it did.
-    ///
-    /// # Errors
-    /// When the line broke or the chip is silent.
-    pub fn submit(&mut self, command: Command<'_>) -> Result<bool> {
-        let now = self.now();
-        let mut sent = Ok(());
-        let number = self.end.submit(command, now, |bytes| sent = self.transport.send(bytes));
-        sent.map(|()| number.is_some())
-    }
-
-    /// Returns the chip's next message, waiting no longer than `wait` for it.
-    ///
-    /// # Errors
-    /// When the line broke, or the chip is silent or has forgotten the session: the error says how many commands are
-    /// concerned. [`ChipProblem::Replaced`] where it was reset and has another model than [`Connection::model`] described;
-    /// that has to be asked again then.
-    pub fn hear(&mut self, wait: Duration) -> Result<Option<Received>> {
-        if self.heard.is_empty() {
-            self.exchange(wait)?;
-        }
-        let Some((received, boot)) = self.heard.pop_front() else { return Ok(None) };
-        if matches!(received, Received::Event(..))
-            && let Err(error) = self.check_model(boot)
-        {
-            // It is of the model that the chip has now.
-            self.heard.push_front((received, boot));
-            return Err(error);
-        }
-        Ok(Some(received))
-    }
-
-    /// Checks the model of a chip that has restarted since its model was read: a loaded model that cannot be read any more
-    /// is replaced by the program's own.
-    fn check_model(&mut self, boot: u32) -> Result<()> {
-        let Some((known, of)) = self.model else { return Ok(()) };
-        if of == boot {
-            return Ok(());
-        }
-        match self.ask(Query::Model)? {
-            Reply::Model(info) if info.checksum == known => {
-                self.model = Some((known, boot));
-                Ok(())
-            }
-            Reply::Model(_) | Reply::Refused(Refusal::NoModel) => {
-                self.model = None;
-                Err(self.wrong(ChipProblem::Replaced))
-            }
-            reply => self.unexpected(&reply),
-        }
-    }
-
-    fn exchange(&mut self, wait: Duration) -> Result<()> {
+    /// Takes what comes within `wait`, answers it, and sends again what is due.
+    fn exchange(&mut self, wait: Duration, mut answer: impl FnMut(Answer<'_>)) -> Result<Result<(), LinkError>> {
         let bytes = self.transport.receive(wait)?;
         let now = self.now();
-        let Self { end, transport, heard, reply, open, .. } = self;
+        let Self { end, transport, heard, is_open, is_doubtful, .. } = self;
         let mut sent = Ok(());
         let mut send = |bytes: &[u8]| {
             if sent.is_ok() {
@@ -192,99 +108,151 @@ impl Connection {
             }
         };
         end.receive(&bytes, now, &mut send, |incoming| match incoming {
-            Incoming::Opened => *open = true,
-            Incoming::Outcome { outcome, .. } => heard.push_back((Received::Outcome(outcome), 0)),
-            Incoming::Event { event, missed, boot } => heard.push_back((Received::Event(event, missed), boot)),
-            Incoming::Answer(answer) => *reply = Some(keep(answer)),
+            Incoming::Opened => *is_open = true,
+            Incoming::Answer(given) => answer(given),
+            // Told in `hear`, whether or not the chip's own announcement arrives.
+            Incoming::Event { event: Event::Started, .. } => {}
+            Incoming::Event { event, missed } => heard.push_back((event, missed)),
+            Incoming::Stranger => *is_doubtful = true,
         });
         let ticked = end.tick(now, &mut send);
+        sent.map(|()| ticked)
+    }
+
+    /// The chip's next message about something that it was not asked for, and how many before it were lost, waiting no longer than
+    /// `wait` for it. A chip that was reset is in a new session then, and [`Event::Started`] tells it: it may have another model.
+    ///
+    /// # Errors
+    /// When the line broke or the chip is silent.
+    pub fn hear(&mut self, wait: Duration) -> Result<Option<(Event, u32)>> {
+        if self.heard.is_empty() {
+            // Without a request under way, nothing ends the session.
+            let _ = self.exchange(wait, |_| ())?;
+        }
+        if std::mem::take(&mut self.is_doubtful)
+            && let Err(error) = self.try_ask(Request::Counts, |_| Some(()))?
+        {
+            if error != LinkError::Forgotten {
+                return Err(self.ended(error));
+            }
+            self.connect()?;
+            self.heard.push_front((Event::Started, 0));
+        }
+        Ok(self.heard.pop_front())
+    }
+
+    /// The answer to a request, or why the session has ended; `read` takes what it expects of an answer.
+    fn try_ask<T>(
+        &mut self,
+        request: Request<'_>,
+        read: impl Fn(Answer<'_>) -> Option<T>,
+    ) -> Result<Result<Result<T, Refusal>, LinkError>> {
+        let now = self.now();
+        let mut sent = Ok(());
+        let is_sent = self.end.request(request, now, |bytes| sent = self.transport.send(bytes));
         sent?;
-        ticked.map_err(|error| self.wrong(ChipProblem::from(error)))
-    }
-
-    fn ask(&mut self, query: Query) -> Result<Reply> {
-        match self.ask_until(query, None)? {
-            Some(reply) => Ok(reply),
-            None => Err(self.wrong(ChipProblem::UnexpectedAnswer)),
+        if !is_sent {
+            // One that was never answered is still under way.
+            return Ok(Err(LinkError::Silent));
         }
-    }
-
-    /// The answer; none if it has not come by `until`.
-    fn ask_until(&mut self, query: Query, until: Option<Instant>) -> Result<Option<Reply>> {
-        let mut asked = false;
-        self.reply = None;
+        let mut answered = None;
         loop {
-            if !asked {
-                let now = self.now();
-                let mut sent = Ok(());
-                asked = self.end.ask(query, now, |bytes| sent = self.transport.send(bytes));
-                sent?;
+            let ticked = self.exchange(TICK, |answer| {
+                answered = Some(match answer {
+                    Answer::Refused(refusal) => Some(Err(refusal)),
+                    answer => read(answer).map(Ok),
+                });
+            })?;
+            match (answered.take(), ticked) {
+                (Some(Some(answer)), _) => return Ok(Ok(answer)),
+                (Some(None), _) => {
+                    return Err(self.wrong("the chip's answer does not match the question", OTHER_VERSION));
+                }
+                (None, Err(error)) => return Ok(Err(error)),
+                (None, Ok(())) => {}
             }
-            if let Some(reply) = self.reply.take() {
-                return Ok(Some(reply));
-            }
-            if until.is_some_and(|until| Instant::now() > until) {
-                self.end.withdraw();
-                return Ok(None);
-            }
-            self.exchange(Duration::from_millis(20))?;
         }
     }
 
-    fn unexpected<T>(&self, reply: &Reply) -> Result<T> {
-        Err(self.wrong(match *reply {
-            Reply::Refused(refusal) => ChipProblem::Refused(refusal),
-            _ => ChipProblem::UnexpectedAnswer,
-        }))
+    /// The answer to a request, or the refusal.
+    fn ask<T>(&mut self, request: Request<'_>, read: impl Fn(Answer<'_>) -> Option<T>) -> Result<Result<T, Refusal>> {
+        self.try_ask(request, read)?.map_err(|error| self.ended(error))
     }
 
-    /// The error for a problem with this chip.
-    pub(super) fn wrong(&self, problem: ChipProblem) -> Error {
-        Error::variant_at(Place::file(self.transport.name()), problem)
+    /// The answer to a request that must not be refused.
+    fn must<T>(&mut self, request: Request<'_>, read: impl Fn(Answer<'_>) -> Option<T>) -> Result<T> {
+        self.ask(request, read)?.map_err(|refusal| self.refused(refusal))
+    }
+
+    /// A problem with this chip.
+    pub(super) fn wrong(&self, what: impl Into<String>, fix: &str) -> Error {
+        Error::new(what).fix(fix).at(Place::file(self.transport.name()))
+    }
+
+    /// The error for a session that has ended.
+    pub(super) fn ended(&self, error: LinkError) -> Error {
+        let fix = match error {
+            LinkError::Forgotten => "Start again.".into(),
+            _ => format!(
+                "Check the port, its speed and the cable, and that the chip's program speaks link version {VERSION}."
+            ),
+        };
+        self.wrong(error.to_string(), &fix).as_kind(Kind::Lost)
+    }
+
+    /// The error for a refusal that leaves nothing to go on with.
+    pub fn refused(&self, refusal: Refusal) -> Error {
+        let fix = match refusal {
+            Refusal::NoModel => NO_MODEL,
+            Refusal::NoObject => "Load the model again.",
+            Refusal::Position => {
+                "Load maps, which `palpate train` makes of touches with a position, or leave positions out."
+            }
+            _ => OTHER_VERSION,
+        };
+        self.wrong(format!("the chip refuses: {refusal}"), fix)
+    }
+
+    /// The model in use on the chip, if there is one.
+    ///
+    /// # Errors
+    /// When the line broke or the chip is silent.
+    pub fn model(&mut self) -> Result<Option<ChipModel>> {
+        let info = match self.ask(Request::Model, |answer| match answer {
+            Answer::Model(info) => Some(info),
+            _ => None,
+        })? {
+            Ok(info) => info,
+            Err(Refusal::NoModel) => return Ok(None),
+            Err(refusal) => return Err(self.refused(refusal)),
+        };
+        let objects = (0..=info.last_object).map(|object| self.must(Request::Name { object }, name));
+        let names = objects.collect::<Result<_>>()?;
+        let mut placements = Vec::new();
+        for placement in if info.has_maps() { 0..u8::MAX } else { 0..0 } {
+            match self.ask(Request::Placement { placement }, name)? {
+                Ok(name) => placements.push(name),
+                Err(Refusal::NoObject) => break,
+                Err(refusal) => return Err(self.refused(refusal)),
+            }
+        }
+        Ok(Some(ChipModel { info, names, placements }))
     }
 
     /// The model in use on the chip.
     ///
     /// # Errors
-    /// [`ChipProblem::NoModel`] if it has none. When the line broke or the chip is silent.
-    pub fn model(&mut self) -> Result<ChipModel> {
-        let info = match self.ask(Query::Model)? {
-            Reply::Model(info) => info,
-            Reply::Refused(Refusal::NoModel) => return Err(self.wrong(ChipProblem::NoModel)),
-            reply => return self.unexpected(&reply),
-        };
-        let mut names = Vec::new();
-        for object in 0..=info.last_object {
-            match self.ask(Query::Name { object })? {
-                Reply::Name(name) => names.push(name),
-                reply => return self.unexpected(&reply),
-            }
-        }
-        let mut placements = Vec::new();
-        while info.has_maps() && placements.len() < 255 {
-            let placement = u8::try_from(placements.len()).unwrap_or(u8::MAX);
-            match self.ask(Query::Placement { placement })? {
-                Reply::Name(name) => placements.push(name),
-                Reply::Refused(Refusal::NoObject) => break,
-                reply => return self.unexpected(&reply),
-            }
-        }
-        self.model = Some((info.checksum, self.end.boot()));
-        Ok(ChipModel { info, names, placements })
+    /// When it has none, the line broke or the chip is silent.
+    pub fn must_have_model(&mut self) -> Result<ChipModel> {
+        self.model()?.ok_or_else(|| self.wrong("the chip has no model", NO_MODEL))
     }
 
-    /// Name and version of the chip's program; none if it does not say. A chip that does not know the question takes ten
-    /// seconds.
+    /// Name and version of the chip's program; none if it does not say.
     ///
     /// # Errors
     /// When the line broke or the chip is silent.
     pub fn program(&mut self) -> Result<Option<String>> {
-        let until = Instant::now() + Duration::from_secs(10);
-        match self.ask_until(Query::Program, Some(until))? {
-            Some(Reply::Program(program)) => Ok(Some(program).filter(|program| !program.is_empty())),
-            Some(reply) => self.unexpected(&reply),
-            None => Ok(None),
-        }
+        Ok(Some(self.must(Request::Program, name)?).filter(|program| !program.is_empty()))
     }
 
     /// Counts kept by the chip's end.
@@ -292,10 +260,10 @@ impl Connection {
     /// # Errors
     /// When the line broke or the chip is silent.
     pub fn chip_statistics(&mut self) -> Result<Statistics> {
-        match self.ask(Query::Statistics)? {
-            Reply::Statistics(statistics) => Ok(statistics),
-            reply => self.unexpected(&reply),
-        }
+        self.must(Request::Counts, |answer| match answer {
+            Answer::Counts(statistics) => Some(statistics),
+            _ => None,
+        })
     }
 
     /// The posteriors of all objects in Q56.
@@ -306,127 +274,138 @@ impl Connection {
         let mut posteriors = Vec::new();
         while posteriors.len() < objects {
             let first = u8::try_from(posteriors.len()).unwrap_or(u8::MAX);
-            match self.ask(Query::Posteriors { first })? {
-                Reply::Posteriors(page) if !page.is_empty() => posteriors.extend(page),
-                reply => return self.unexpected(&reply),
-            }
+            posteriors.extend(self.must(Request::Posteriors { first }, |answer| match answer {
+                Answer::Posteriors(bytes) if !bytes.is_empty() => {
+                    Some(bytes.as_chunks::<8>().0.iter().map(|bytes| u64::from_le_bytes(*bytes)).collect::<Vec<_>>())
+                }
+                _ => None,
+            })?);
         }
         Ok(posteriors)
     }
 
-    /// The approach that the chip proposes, of those in any pose. A chip that does not know the question does not
-    /// answer.
+    /// Has the chip take a touch into account: its verdict, or why it does not count the touch.
     ///
     /// # Errors
-    /// [`ChipProblem::Refused`] if its model has no plan. When the line broke or the chip is silent.
-    pub fn next_approach(&mut self) -> Result<ApproachMessage> {
-        match self.ask(Query::NextApproach { without: [0; POSE_BYTES] })? {
-            Reply::NextApproach(approach) => Ok(approach),
-            reply => self.unexpected(&reply),
+    /// When the chip refuses it for another reason, the line broke, or the chip is silent or has forgotten the session.
+    pub fn touch(&mut self, touch: &Touch) -> Result<Result<VerdictMessage, Refusal>> {
+        let answered = self.ask(Request::of_touch(touch, true), |answer| match answer {
+            Answer::Verdict(verdict) => Some(verdict),
+            _ => None,
+        })?;
+        match answered {
+            Err(refusal) if !refusal.is_of_a_touch() => Err(self.refused(refusal)),
+            answered => Ok(answered),
         }
     }
 
-    /// True if no finger met more than the table, and the most likely places of the most likely object, of a model of maps.
+    /// Has the chip forget all touches: another object comes.
     ///
     /// # Errors
-    /// [`ChipProblem::Refused`] if it has none. When the line broke or the chip is silent.
-    pub fn places(&mut self) -> Result<(bool, Vec<Pose>)> {
-        places(|rank| match self.ask(Query::Place { rank })? {
-            Reply::Place(table_alone, place) => Ok((table_alone, place)),
-            reply => self.unexpected(&reply),
+    /// When the chip refuses, the line broke, or the chip is silent or has forgotten the session.
+    pub fn reset(&mut self) -> Result<()> {
+        self.must(Request::Reset, |answer| (answer == Answer::Done).then_some(()))
+    }
+
+    /// The approach that the chip proposes, of those in any pose; refused if its model has no plan.
+    ///
+    /// # Errors
+    /// When the line broke or the chip is silent.
+    pub fn next_approach(&mut self) -> Result<Result<ApproachMessage, Refusal>> {
+        self.ask(Request::NextApproach { without: [0; POSE_BYTES] }, |answer| match answer {
+            Answer::NextApproach(approach) => Some(approach),
+            _ => None,
         })
     }
 
-    /// The approach straight down that the chip proposes, of a model of maps; `within` as in [`Query::NextPress`].
+    /// The most likely places of the most likely object, of a model of maps; the first answer says what is true of all.
+    ///
+    /// # Errors
+    /// When the chip has none, the line broke or the chip is silent.
+    pub fn places(&mut self) -> Result<(PlaceMessage, Vec<Pose>)> {
+        places(|rank| {
+            self.must(Request::Place { rank }, |answer| match answer {
+                Answer::Place(place) => Some(place),
+                _ => None,
+            })
+        })
+    }
+
+    /// The approach straight down that the chip proposes, of a model of maps; `within` as in [`Request::NextPress`].
     ///
     /// # Errors
     /// Errors of [`places`](Self::places).
     pub fn next_press(&mut self, within: Option<u32>) -> Result<Approach> {
-        match self.ask(Query::NextPress { within })? {
-            Reply::NextPress(approach) => Ok(approach),
-            reply => self.unexpected(&reply),
-        }
+        self.must(Request::NextPress { within }, |answer| match answer {
+            Answer::NextPress(approach) => Some(approach),
+            _ => None,
+        })
     }
 
     /// Loads a model into the chip, which checks it before it uses it. `progress` counts bytes.
     ///
     /// # Errors
-    /// [`ChipProblem::ModelRefused`] when the chip refuses it: it then goes on with the one it had, as it does when this
-    /// is [cancelled](crate::error::Kind::Cancelled); loaded again, a model goes on where it was. When the line broke or the chip is silent.
+    /// When the chip refuses it: it then goes on with the one it had, as it does when this is
+    /// [cancelled](crate::error::Kind::Cancelled); loaded again, a model goes on where it was. When the line broke or the chip is
+    /// silent.
     pub fn load(&mut self, bytes: &[u8], progress: &dyn Progress) -> Result<()> {
         progress.begin("loading", Some(bytes.len() as u64));
-        self.model = None;
         let length = u32::try_from(bytes.len()).unwrap_or(u32::MAX);
-        let begin = Command::Begin { length, checksum: checksum(bytes) };
-        let command = |at: usize| match bytes.get(at..).unwrap_or_default() {
-            [] => (Command::Commit, usize::MAX),
-            rest => {
-                let (offset, bytes) = (u32::try_from(at).unwrap_or(u32::MAX), rest.get(..CHUNK).unwrap_or(rest));
-                (Command::Chunk { offset, bytes }, at + bytes.len())
-            }
-        };
-        self.submit(begin)?;
-        // Ends of the commands under way, and how many of them the chip refuses because it goes on from an earlier byte.
-        let (mut under_way, mut passed_over) = (VecDeque::from([0]), 0_usize);
-        let (mut next, mut told, mut continued) = (0, 0, 0);
+        let mut request = Request::Begin { length, checksum: checksum(bytes) };
+        let (mut at, mut told, mut continued) = (0, 0, 0);
         loop {
-            // The outcome of the beginning says which chunk is the first.
-            while passed_over == 0 && next != usize::MAX && under_way.front() != Some(&0) && self.has_room() {
-                let (command, end) = command(next);
-                self.submit(command)?;
-                next = end;
-                under_way.push_back(end);
-            }
-            let Some(&end) = under_way.front() else { return Ok(()) };
-            let Some(Received::Outcome(outcome)) = self.hear(Duration::from_millis(20))? else {
-                progress::check(progress)?;
-                continue;
-            };
-            under_way.pop_front();
-            let arrived = match outcome {
-                _ if passed_over > 0 => {
-                    passed_over -= 1;
-                    continue;
+            let wanted = self.ask(request, |answer| match answer {
+                Answer::Wanted { offset } => Some(offset),
+                _ => None,
+            })?;
+            let offset = match wanted {
+                Ok(offset) if offset >= at || continued < CONTINUED => offset,
+                wanted => {
+                    let refusal = wanted.err().unwrap_or(Refusal::Unwritable);
+                    let fix = "Load another model; the chip still uses the one it had.";
+                    return Err(self.wrong(format!("the chip refuses the model: {refusal}"), fix));
                 }
-                Outcome::Continue { offset } if continued < CONTINUED => {
-                    next = usize::try_from(offset).unwrap_or(usize::MAX).min(bytes.len());
-                    (passed_over, continued) = (under_way.len(), continued + 1);
-                    next
-                }
-                Outcome::Continue { .. } => return Err(self.wrong(ChipProblem::ModelRefused(Refusal::Unwritable))),
-                Outcome::Refused(refusal) => return Err(self.wrong(ChipProblem::ModelRefused(refusal))),
-                _ => end.min(bytes.len()),
             };
+            continued += u32::from(offset < at);
+            at = offset;
+            let arrived = usize::try_from(offset).unwrap_or(usize::MAX).min(bytes.len());
             progress::advance(progress, arrived.saturating_sub(told) as u64)?;
             told = told.max(arrived);
+            let rest = bytes.get(arrived..).unwrap_or_default();
+            if rest.is_empty() {
+                return Ok(());
+            }
+            request = Request::Chunk { offset, bytes: rest.get(..CHUNK).unwrap_or(rest) };
         }
     }
 }
 
-/// The places that are answered, from the most likely on, and whether no finger met more than the table.
-pub(super) fn places<E>(mut ask: impl FnMut(u8) -> Result<(bool, Option<Pose>), E>) -> Result<(bool, Vec<Pose>), E> {
-    let mut poses = Vec::new();
-    loop {
-        let (table_alone, place) = ask(u8::try_from(poses.len()).unwrap_or(u8::MAX))?;
-        let Some(place) = place.filter(|_| poses.len() < 255) else { return Ok((table_alone, poses)) };
-        poses.push(place);
-    }
+const NO_MODEL: &str = "Load a model into it.";
+const OTHER_VERSION: &str = "Flash the chip again: its program speaks another version of the link.";
+
+/// The error for a line that carries touches, and a model over rows.
+pub fn no_rows() -> Error {
+    problem!("the model is over rows of features, and the line to a chip carries touches").fix(
+        "Recognize rows here with `palpate recognize MODEL ROWS.csv --features`; on the chip the program itself \
+         passes them to push_features, and its verdicts are the same.",
+    )
 }
 
-fn keep(answer: Answer<'_>) -> Reply {
+/// The places that are answered, from the most likely on, and the first answer.
+pub(super) fn places<E>(mut ask: impl FnMut(u8) -> Result<PlaceMessage, E>) -> Result<(PlaceMessage, Vec<Pose>), E> {
+    let first = ask(0)?;
+    let (mut poses, mut next) = (Vec::new(), first.place);
+    while let Some(pose) = next {
+        poses.push(pose);
+        next = if poses.len() < 255 { ask(u8::try_from(poses.len()).unwrap_or(u8::MAX))?.place } else { None };
+    }
+    Ok((first, poses))
+}
+
+fn name(answer: Answer<'_>) -> Option<String> {
     match answer {
-        Answer::Model(info) => Reply::Model(info),
-        Answer::Name(name) => Reply::Name(name.into()),
-        Answer::Statistics(statistics) => Reply::Statistics(statistics),
-        Answer::Posteriors(bytes) => {
-            Reply::Posteriors(bytes.as_chunks::<8>().0.iter().map(|bytes| u64::from_le_bytes(*bytes)).collect())
-        }
-        Answer::NextApproach(approach) => Reply::NextApproach(approach),
-        Answer::Place { table_alone, place } => Reply::Place(table_alone, place),
-        Answer::NextPress(press) => Reply::NextPress(press),
-        Answer::Program(program) => Reply::Program(program.into()),
-        Answer::Refused(refusal) => Reply::Refused(refusal),
-        _ => Reply::Other,
+        Answer::Name(name) => Some(name.into()),
+        _ => None,
     }
 }
 

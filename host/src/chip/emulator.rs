@@ -2,7 +2,7 @@
 
 use super::Transport;
 use super::qemu::{self, Qemu};
-use crate::error::{ChipProblem, Result};
+use crate::error::Result;
 use std::path::PathBuf;
 use std::process::Command;
 use std::time::Duration;
@@ -37,11 +37,10 @@ impl Emulator {
     /// Starts it; its UART is the transport.
     ///
     /// # Errors
-    /// [`ChipProblem::NoImage`] when the firmware has not been built, [`ChipProblem::NoEmulator`] when the emulator is
-    /// not installed.
+    /// When the firmware has not been built, or the emulator is not installed.
     pub fn start(&self) -> Result<Transport> {
         if !self.firmware.is_file() {
-            return Err(ChipProblem::NoImage { path: self.firmware.clone() }.into());
+            return Err(qemu::no_image(&self.firmware));
         }
         let mut command = Command::new(&self.program);
         command.args(["-machine", &self.machine, "-display", "none", "-serial", "stdio"]);

@@ -83,9 +83,7 @@ impl Entry {
                 times: touch.times().map(|time| time.micros()),
                 verdict: match verdict.decision {
                     Decision::Recognized(object) => name(object),
-                    Decision::Unknown => "unknown".into(),
-                    Decision::GaveUp => "gave-up".into(),
-                    _ => "undecided".into(),
+                    decision => decision.name().into(),
                 },
                 best: name(verdict.best),
                 touches: verdict.touches,
@@ -104,7 +102,7 @@ impl Entry {
                 Some(Self::Fault { what: format!("a touch was not counted: {refusal}") })
             }
             Update::Next(approach) => Some(Self::next(approach)),
-            Update::Located(_) | Update::Event(..) | Update::Idle => None,
+            Update::Located(_) | Update::Event(..) => None,
         }
     }
 }

@@ -6,7 +6,7 @@
 //! alignment in Q15 (i16, zeros without a pose).
 
 use super::qemu;
-use crate::error::{ChipProblem, Error, Result};
+use crate::error::{Error, Result, problem};
 use palpate_shared::Touch;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -47,14 +47,13 @@ impl Chip {
         ["onboard/firmware/target", target, "release/cost"].iter().collect()
     }
 
-    /// Reason why instructions cannot be measured here: [`ChipProblem::NoEmulator`] or [`ChipProblem::NoImage`]. `None`
-    /// if they can be.
-    pub fn obstacle(self) -> Option<ChipProblem> {
+    /// Reason why instructions cannot be measured here: no emulator, or no image. `None` if they can be.
+    pub fn obstacle(self) -> Option<Error> {
         if !qemu::is_installed(Path::new(qemu::PROGRAM)) {
-            return Some(ChipProblem::NoEmulator);
+            return Some(qemu::no_emulator());
         }
         let path = self.image();
-        (!path.is_file()).then_some(ChipProblem::NoImage { path })
+        (!path.is_file()).then(|| qemu::no_image(&path))
     }
 
     /// True if instructions can be measured here.
@@ -105,7 +104,10 @@ fn read_cost(text: &str) -> Result<Cost> {
     let after = |name: &str| text.split_whitespace().skip_while(|&word| word != name).nth(1)?.parse().ok();
     match (after("margins"), after("push")) {
         (Some(margins), Some(push)) => Ok(Cost { margins, push }),
-        _ => Err(ChipProblem::NoCost { said: text.trim().into() }.into()),
+        _ => {
+            let said = qemu::after_colon(text);
+            Err(problem!("the emulated chip did not report the instructions of a touch{said}").fix(qemu::BUILD_AGAIN))
+        }
     }
 }
 

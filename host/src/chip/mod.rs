@@ -6,12 +6,11 @@
 //!                └──► mirror: the host's own recognizer, which the chip is compared with
 //! ```
 //!
-//! The messages, and why no touch is counted twice: [`palpate_shared::link`].
+//! The messages, and why no touch is lost or counted twice: [`palpate_shared::link`].
 
 mod connection;
 mod emulator;
 mod entry;
-pub(crate) mod error;
 pub mod inspect;
 pub mod instructions;
 mod port;
@@ -21,7 +20,7 @@ mod steps;
 mod stream;
 mod transport;
 
-pub use connection::{ChipModel, Connection, Received};
+pub use connection::{ChipModel, Connection, no_rows};
 pub use emulator::Emulator;
 pub use entry::Entry;
 pub use port::Port;

@@ -1,7 +1,7 @@
 //! Address of a chip.
 
 use super::{Emulator, Transport};
-use crate::error::{ChipProblem, Error, Place, Result};
+use crate::error::{Error, Kind, Place, Result, problem};
 use std::fmt;
 use std::io::Write;
 use std::net::{Shutdown, TcpStream};
@@ -25,7 +25,7 @@ impl FromStr for Port {
     fn from_str(text: &str) -> Result<Self> {
         match text.split_once("://") {
             Some(("tcp", address)) if address.contains(':') => Ok(Self::Tcp(address.into())),
-            Some(_) => Err(ChipProblem::NotAPort { text: text.into() }.into()),
+            Some(_) => Err(problem!("`{text}` is not a port").fix("Give a serial port, tcp://HOST:PORT or emulator.")),
             None if text == "emulator" => Ok(Self::Emulator),
             None => Ok(Self::Serial(text.into())),
         }
@@ -46,17 +46,17 @@ impl Port {
     /// Opens the port; `baud` is the speed of a serial one in bits per second, `emulator` what to start.
     ///
     /// # Errors
-    /// When the port cannot be opened or the emulator cannot be started. [`ChipProblem::NoSerialPorts`] for a serial port
-    /// without the feature `serial`.
+    /// When the port cannot be opened, the emulator cannot be started, or the port is a serial one and this build has no feature
+    /// `serial`.
     pub fn open(&self, baud: u32, emulator: &Emulator) -> Result<Transport> {
         match self {
             Self::Serial(name) => serial::open(name, baud),
             Self::Tcp(address) => {
                 let io = |source: std::io::Error| {
-                    Error::variant_at(
-                        Place::file(self.to_string()),
-                        ChipProblem::CannotConnect { reason: source.to_string() },
-                    )
+                    problem!("cannot connect to the chip: {source}")
+                        .fix("Check the address, and that a program serves the chip there.")
+                        .as_kind(Kind::Lost)
+                        .at(Place::file(self.to_string()))
                 };
                 let stream = TcpStream::connect(address).map_err(io)?;
                 stream.set_nodelay(true).map_err(io)?;
@@ -90,7 +90,7 @@ impl Write for TcpWriter {
 #[cfg(feature = "serial")]
 mod serial {
     use super::super::Transport;
-    use crate::error::{ChipProblem, Error, Place, Result};
+    use crate::error::{Kind, Place, Result, problem};
     use serialport::SerialPort;
     use std::io::{ErrorKind, Read, Write};
     use std::time::Duration;
@@ -98,8 +98,15 @@ mod serial {
     pub(super) fn open(name: &str, baud: u32) -> Result<Transport> {
         let wrong = |error: serialport::Error| {
             let ports = serialport::available_ports().unwrap_or_default();
-            let ports = ports.into_iter().map(|port| port.port_name).collect();
-            Error::variant_at(Place::file(name), ChipProblem::CannotOpen { reason: error.to_string(), ports })
+            let ports: Vec<String> = ports.into_iter().map(|port| port.port_name).collect();
+            let ports = match ports.as_slice() {
+                [] => "This machine has no serial port".to_owned(),
+                ports => format!("Serial ports of this machine: {}", ports.join(", ")),
+            };
+            problem!("cannot open the serial port: {error}")
+                .fix(format!("{ports}. Check the cable, and that no other program has the port open."))
+                .as_kind(Kind::Lost)
+                .at(Place::file(name))
         };
         let port = serialport::new(name, baud).timeout(Duration::from_millis(100)).open().map_err(wrong)?;
         let reader = port.try_clone().map_err(wrong)?;
@@ -138,10 +145,12 @@ mod serial {
 #[cfg(not(feature = "serial"))]
 mod serial {
     use super::super::Transport;
-    use crate::error::{ChipProblem, Error, Place, Result};
+    use crate::error::{Place, Result, problem};
 
     pub(super) fn open(name: &str, _: u32) -> Result<Transport> {
-        Err(Error::variant_at(Place::file(name), ChipProblem::NoSerialPorts))
+        Err(problem!("this build of Palpate has no serial ports")
+            .fix("Build it with the feature `serial`, or reach the chip through tcp://HOST:PORT.")
+            .at(Place::file(name)))
     }
 }
 

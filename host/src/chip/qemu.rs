@@ -1,6 +1,6 @@
 //! QEMU as a child process: started, its messages kept, reset, ended.
 
-use crate::error::{ChipProblem, Error, Place, Result};
+use crate::error::{Error, Place, Result, problem};
 use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
@@ -83,7 +83,7 @@ impl Qemu {
 
     #[cfg(not(unix))]
     pub(super) fn reset(&self) -> Result<()> {
-        Err(ChipProblem::NoReset.into())
+        Err(no_reset())
     }
 }
 
@@ -114,7 +114,32 @@ pub(super) fn output(mut command: Command, patience: Duration) -> Result<String>
         std::thread::sleep(Duration::from_millis(5));
     }
     let text: String = [stdout, stderr].into_iter().flatten().filter_map(|thread| thread.join().ok()).collect();
-    if late { Err(ChipProblem::EmulatorTimeout { seconds: patience.as_secs(), said: text }.into()) } else { Ok(text) }
+    if late {
+        let (seconds, said) = (patience.as_secs(), after_colon(&text));
+        return Err(problem!("the emulated chip did not finish within {seconds} s{said}").fix(BUILD_AGAIN));
+    }
+    Ok(text)
+}
+
+/// Remedy where the image that reports instructions does not.
+pub(super) const BUILD_AGAIN: &str = "Build its image again: cd onboard/firmware && cargo build --release --bin cost.";
+
+/// Words of a program after a colon; nothing if it said nothing.
+pub(super) fn after_colon(said: &str) -> String {
+    if said.trim().is_empty() { String::new() } else { format!(": {}", said.trim()) }
+}
+
+pub(super) fn no_reset() -> Error {
+    problem!("the chip cannot be reset from here").fix("Reset it by hand, or use the emulator on Linux or macOS.")
+}
+
+pub(super) fn no_emulator() -> Error {
+    problem!("the emulator is not installed").fix("Install it: apt-get install qemu-system-arm, brew install qemu.")
+}
+
+pub(super) fn no_image(path: &Path) -> Error {
+    problem!("the firmware image {} does not exist", path.display())
+        .fix("Build it: cd onboard/firmware && cargo build --release.")
 }
 
 /// True if `program` can be started.
@@ -127,7 +152,7 @@ fn spawn(command: &mut Command) -> Result<Child> {
     command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().map_err(|source| {
         let program = PathBuf::from(command.get_program());
         match source.kind() {
-            ErrorKind::NotFound => Error::variant_at(Place::file(program), ChipProblem::NoEmulator),
+            ErrorKind::NotFound => no_emulator().at(Place::file(program)),
             _ => Error::io(program, "start the emulator", source),
         }
     })

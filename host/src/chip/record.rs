@@ -1,7 +1,7 @@
 //! Recording of the reports of a chip's own fingers into a data set.
 
-use super::{ChipModel, Connection, Received, Transport};
-use crate::error::{ChipProblem, Error, Result};
+use super::{ChipModel, Connection, Transport};
+use crate::error::{Error, Kind, Result};
 use crate::touches::Recording;
 use palpate_shared::Touch;
 use palpate_shared::link::{Event, FaultKind, Refusal, VerdictMessage};
@@ -76,8 +76,8 @@ pub struct RecordSummary {
 /// Records what the chip reports until there are `count` touches or `each` breaks, and passes everything to `each`, in
 /// order. When `each` hears of a touch, it is on the disk.
 ///
-/// When the line breaks, `reopen` is called until it succeeds. Touches that the chip reports meanwhile are lost: they are
-/// counted as missed, unless the chip was without power too. No touch is recorded twice.
+/// When the line breaks, `reopen` is called until it succeeds. The chip keeps the last [`EVENTS`](palpate_shared::link::EVENTS) touches and faults that nobody has
+/// heard; those before them are counted as missed, unless the chip was without power too. No touch is recorded twice.
 ///
 /// # Errors
 /// When the data set cannot be written, an emulated chip ends, or `each` fails. The data set is whole in any case.
@@ -99,7 +99,7 @@ pub fn record(
         match step {
             Ok(ControlFlow::Continue(())) => {}
             Ok(ControlFlow::Break(())) => break Ok(()),
-            Err(error) if is_lost(&error) => {
+            Err(error) if error.is(&Kind::Lost) => {
                 summary.lost += 1;
                 connected = false;
                 recording.checkpoint()?;
@@ -118,7 +118,7 @@ pub fn record(
     Ok(summary)
 }
 
-/// Asks the chip for its program's name and version.
+/// Asks the chip for its program and model.
 fn greet(
     connection: &mut Connection,
     recording: &mut Recording,
@@ -126,11 +126,7 @@ fn greet(
     each: &mut impl FnMut(&RecordEvent<'_>) -> Result<ControlFlow<()>>,
 ) -> Result<ControlFlow<()>> {
     let program = connection.program()?;
-    let model = match connection.model() {
-        Ok(model) => Some(model),
-        Err(error) if is(&error, |problem| *problem == ChipProblem::NoModel) => None,
-        Err(error) => return Err(error),
-    };
+    let model = connection.model()?;
     let other = recording.made_by(program.clone(), model.as_ref().map(|model| model.info.checksum))?;
     let heard = RecordEvent::Connected { program: program.as_deref(), model: model.as_ref(), other: other.as_deref() };
     let flow = each(&heard);
@@ -149,10 +145,7 @@ fn listen(
     if count.is_some_and(|count| summary.touches >= count) {
         return Ok(ControlFlow::Break(()));
     }
-    let (event, missed) = match connection.hear(Duration::from_millis(50))? {
-        Some(Received::Event(event, missed)) => (event, missed),
-        _ => return each(&RecordEvent::Idle),
-    };
+    let Some((event, missed)) = connection.hear(Duration::from_millis(50))? else { return each(&RecordEvent::Idle) };
     if missed > 0 {
         summary.missed += u64::from(missed);
         if each(&RecordEvent::Missed(missed))?.is_break() {
@@ -166,7 +159,8 @@ fn listen(
             summary.faults += 1;
             return each(&RecordEvent::Fault { kind, finger });
         }
-        _ => return Ok(ControlFlow::Continue(())),
+        // It may have another program or model.
+        _ => return greet(connection, recording, summary, each),
     };
     if recording.lacks_pose(&touch) {
         summary.without_pose += 1;
@@ -194,35 +188,11 @@ fn wait(
     loop {
         match reopen().and_then(|transport| connection.reopen(transport)) {
             Ok(()) => return Ok(ControlFlow::Continue(())),
-            Err(error) if !is_lost(&error) && !is(&error, is_closed) => return Err(error),
-            Err(_) => std::thread::sleep(RETRY),
+            Err(error) if error.is(&Kind::Lost) => std::thread::sleep(RETRY),
+            Err(error) => return Err(error),
         }
         if each(&RecordEvent::Idle)?.is_break() {
             return Ok(ControlFlow::Break(()));
         }
     }
-}
-
-/// True if the line broke, or the chip does not know the session any more or has another model: it may come back, and says
-/// again what it is.
-fn is_lost(error: &Error) -> bool {
-    let lost = |problem: &ChipProblem| {
-        matches!(
-            problem,
-            ChipProblem::Lost { .. }
-                | ChipProblem::Silent { .. }
-                | ChipProblem::Forgotten { .. }
-                | ChipProblem::Replaced
-        )
-    };
-    is(error, lost)
-}
-
-/// True if nothing is there yet.
-fn is_closed(problem: &ChipProblem) -> bool {
-    matches!(problem, ChipProblem::CannotOpen { .. } | ChipProblem::CannotConnect { .. })
-}
-
-fn is(error: &Error, which: impl FnOnce(&ChipProblem) -> bool) -> bool {
-    matches!(error.problem::<ChipProblem>(), Some(problem) if which(problem))
 }

@@ -1,16 +1,15 @@
 //! Touches to the chip, verdicts from it, and the host's own recognizer beside it.
 
 use super::connection::places;
-use super::{ChipModel, Connection, Received, Step, Steps};
-use crate::error::{ChipProblem, Result};
+use super::{ChipModel, Connection, Step, Steps};
+use crate::error::Result;
 use crate::locate::{Approach, CELLS, Pose, TOUCHES};
 use palpate_onboard::station::{NoStorage, Station, Table};
 use palpate_shared::link::{
-    ApproachMessage, Command, Decision, Device, Event, Outcome, POSE_BYTES, Refusal, VerdictMessage,
+    ApproachMessage, Decision, Device, Event, LinkError, POSE_BYTES, PlaceMessage, Refusal, VerdictMessage,
 };
 use palpate_shared::{Position, Touch};
 use serde::Serialize;
-use std::collections::VecDeque;
 use std::fmt::Debug;
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
@@ -34,6 +33,8 @@ pub enum Asks {
 pub struct Located {
     /// True if no finger met more than the table so far.
     pub table_alone: bool,
+    /// True if the chip's search was not finished.
+    pub exhausted: bool,
     /// The most likely poses of the most likely object, best first.
     pub poses: Vec<Pose>,
     /// Next approach; none after a verdict.
@@ -69,8 +70,6 @@ pub enum Update {
     Located(Located),
     /// Something that happened on the chip by itself, and how many events before it were lost.
     Event(Event, u32),
-    /// Nothing has happened for a while.
-    Idle,
 }
 
 /// Results of a stream.
@@ -96,18 +95,18 @@ pub struct Summary {
     pub undecided: u64,
     /// Seconds in which the chip had something to answer. Waiting for touches to be typed is not included.
     pub seconds: f64,
-    /// Frames that this end sent.
+    /// Requests that this end sent.
     pub sent: u64,
-    /// Frames that this end sent again.
+    /// Requests that this end sent again.
     pub resent: u64,
     /// Garbled frames that this end received.
     pub garbled: u64,
     /// Garbled frames that the chip received.
     pub chip_garbled: u64,
-    /// Commands that reached the chip more than once, and were counted once.
+    /// Requests that reached the chip more than once, and were executed once.
     pub chip_repeated: u64,
-    /// Commands that reached the chip after one that was lost.
-    pub chip_early: u64,
+    /// Requests that reached the chip after a later one, and were not executed.
+    pub chip_late: u64,
     /// The chip's own events that were lost.
     pub missed_events: u64,
 }
@@ -119,36 +118,9 @@ impl Summary {
     }
 }
 
-/// Adds up the time in which something was under way.
-#[derive(Default)]
-struct Busy {
-    since: Option<Instant>,
-    total: Duration,
-}
-
-impl Busy {
-    /// Something is under way or not, from now on.
-    fn set(&mut self, busy: bool, now: Instant) {
-        match (self.since, busy) {
-            (None, true) => self.since = Some(now),
-            (Some(since), false) => {
-                self.total += now.duration_since(since);
-                self.since = None;
-            }
-            _ => {}
-        }
-    }
-}
-
-/// Messages that were sent and have no outcome yet.
-enum Sent {
-    Object(Option<String>),
-    Touch { touch: Touch, expected: Option<Result<VerdictMessage, Refusal>>, posteriors: Option<Vec<f64>> },
-}
-
 /// Streams `steps` to the chip until they end or `each` breaks, and passes every update to `each`, in order. With a
 /// `mirror`, the host recognizes the same touches with this model's bytes and compares every verdict, posterior and evidence; with
-/// maps it has room for [`CELLS`] cells. Answers to `asks` are compared too: one touch at a time is then under way.
+/// maps it has room for [`CELLS`] cells. Answers to `asks` are compared too.
 ///
 /// # Errors
 /// When a step cannot be read, the chip refuses a touch, the line breaks, the mirror's model is not the chip's, or it is
@@ -165,49 +137,27 @@ pub fn stream(
         && let expected = model.last_chunk().map_or(0, |stated| u32::from_le_bytes(*stated))
         && expected != chip.info.checksum
     {
-        return Err(connection.wrong(ChipProblem::OtherModel { chip: chip.info.checksum, expected }));
+        let chip = chip.info.checksum;
+        let what =
+            format!("the chip's model is not the one to compare with: checksum {chip:08x} instead of {expected:08x}");
+        return Err(connection.wrong(what, "Load the model into the chip first."));
     }
     let mut table = Box::new(Table::new());
-    let mut mirror = mirror.map(|model| Mirror::open_with(model, NoStorage, &mut *table));
-    // A person who types lines wants each verdict before typing the next line.
-    let one_by_one = asks != Asks::Nothing || matches!(steps, Steps::Lines { .. });
-    let mut run = Run { summary: Summary::default(), under_way: VecDeque::new(), truth: None, decided: false };
+    let mirror = mirror.map(|model| Mirror::open_with(model, NoStorage, &mut *table));
+    let mut run = Run { summary: Summary::default(), busy: Duration::ZERO, mirror, chip, truth: None, decided: false };
     // An object whose place is asked for ends with its verdict, where lines do not say which touches are of it.
-    let (mut pending, mut has_ended) = (None, false);
-    let mut more = true;
-    let mut busy = Busy::default();
-    while more || pending.is_some() || !run.under_way.is_empty() {
-        while connection.has_room() && (pending.is_some() || more) && (!one_by_one || run.under_way.is_empty()) {
-            let mut step = match pending.take() {
-                Some(step) => Some(step),
-                None => steps.next_step()?,
-            };
-            if std::mem::take(&mut has_ended) && matches!(step, Some(Step::Touch(_))) {
-                pending = step.replace(Step::Object(None));
-            }
-            let Some(step) = step else {
-                more = false;
-                break;
-            };
-            if let Step::Touch(touch) = &step
-                && touch.position().is_some()
-                && !chip.info.has_maps()
-            {
-                return Err(connection.wrong(ChipProblem::Refused(Refusal::Position)));
-            }
-            if !connection.submit(command(&step))? {
-                pending = Some(step);
+    let mut has_ended = false;
+    'steps: while let Some(step) = steps.next_step()? {
+        if std::mem::take(&mut has_ended) && matches!(step, Step::Touch(_)) {
+            let update = run.reset(connection, None)?;
+            if each(connection, update)?.is_break() {
                 break;
             }
-            busy.set(true, Instant::now());
-            run.under_way.push_back(sent(step, mirror.as_mut(), chip));
         }
-        let update = match connection.hear(Duration::from_millis(50))? {
-            None => Update::Idle,
-            Some(Received::Event(event, missed)) => Update::Event(event, missed),
-            Some(Received::Outcome(outcome)) => run.take(outcome, chip).map_err(|problem| connection.wrong(problem))?,
+        let update = match step {
+            Step::Object(name) => run.reset(connection, name)?,
+            Step::Touch(touch) => run.touch(connection, touch)?,
         };
-        busy.set(!run.under_way.is_empty(), Instant::now());
         // A verdict ends the object: the next touch is of another one.
         let (is_touch, is_open) = match &update {
             Update::Touch { verdict, .. } => (true, verdict.decision == Decision::Undecided),
@@ -218,156 +168,157 @@ pub fn stream(
             break;
         }
         let answer = match asks {
-            Asks::Approach if is_open => {
-                let approach = connection.next_approach()?;
-                let expected = mirror.as_ref().map(|mirror| mirror.next_approach(&[0; POSE_BYTES]));
-                run.compare_answers(expected, &Ok(approach));
-                Update::Next(approach)
-            }
+            Asks::Approach if is_open => Some(run.next_approach(connection)?),
             Asks::Place { within } if is_touch => {
-                let (table_alone, poses) = connection.places()?;
-                let next = if is_open { Some(connection.next_press(within)?) } else { None };
-                let located = Located { table_alone, poses, next };
-                run.compare_answers(
-                    mirror.as_mut().map(|mirror| expected(mirror, within, is_open)),
-                    &Ok(located.clone()),
-                );
                 has_ended = !is_open && matches!(steps, Steps::Lines { .. });
-                Update::Located(located)
+                Some(run.locate(connection, within, is_open)?)
             }
-            _ => continue,
+            _ => None,
         };
-        if each(connection, answer)?.is_break() {
-            break;
+        let mut updates = Vec::from_iter(answer);
+        while let Some((event, missed)) = connection.hear(Duration::ZERO)? {
+            if event == Event::Started {
+                return Err(connection.ended(LinkError::Forgotten));
+            }
+            updates.push(Update::Event(event, missed));
+        }
+        for update in updates {
+            if each(connection, update)?.is_break() {
+                break 'steps;
+            }
         }
     }
-    busy.set(false, Instant::now());
-    run.summary.seconds = busy.total.as_secs_f64();
-    run.end_object(chip);
-    let (host, chip) = (connection.statistics(), connection.chip_statistics()?);
-    let summary = run.summary;
+    run.end_object();
+    let (host, counts) = (connection.statistics(), connection.chip_statistics()?);
     Ok(Summary {
+        seconds: run.busy.as_secs_f64(),
         sent: host.sent,
         resent: host.resent,
         garbled: host.garbled,
         missed_events: host.missed_events,
-        chip_garbled: chip.garbled.into(),
-        chip_repeated: chip.repeated.into(),
-        chip_early: chip.early.into(),
-        ..summary
+        chip_garbled: counts.garbled.into(),
+        chip_repeated: counts.repeated.into(),
+        chip_late: counts.late.into(),
+        ..run.summary
     })
 }
 
 /// The host's own recognizer, with a chip's room for maps.
 type Mirror<'m> = Station<'m, 256, NoStorage, &'m mut Table<CELLS, TOUCHES, 16>>;
 
-/// The place that the host's own recognizer says.
-fn expected(mirror: &mut Mirror<'_>, within: Option<u32>, is_open: bool) -> Result<Located, Refusal> {
-    let (table_alone, poses) = places(|rank| mirror.place(rank))?;
-    let next = if is_open { Some(mirror.next_press(within)?) } else { None };
-    Ok(Located { table_alone, poses, next })
-}
-
-fn command(step: &Step) -> Command<'static> {
-    match step {
-        Step::Object(_) => Command::Reset,
-        Step::Touch(touch) => Command::of_touch(touch, true),
-    }
-}
-
-fn sent(step: Step, mirror: Option<&mut Mirror<'_>>, chip: &ChipModel) -> Sent {
-    match step {
-        Step::Object(name) => {
-            if let Some(mirror) = mirror {
-                mirror.reset();
-            }
-            Sent::Object(name)
-        }
-        Step::Touch(touch) => {
-            let Some(mirror) = mirror else { return Sent::Touch { touch, expected: None, posteriors: None } };
-            let expected = Some(match touch.position() {
-                Some(Position { micrometers }) => mirror.press(&touch, micrometers, true),
-                None => mirror.push(&touch, true),
-            });
-            let objects = 0..=chip.info.last_object;
-            let posteriors = objects.map(|object| mirror.posterior(object).map_or(0.0, probability)).collect();
-            Sent::Touch { touch, expected, posteriors: Some(posteriors) }
-        }
-    }
-}
-
 /// A probability from Q56, as chips send posteriors.
 pub fn probability(q56: u64) -> f64 {
     q56 as f64 / (1_u64 << 56) as f64
 }
 
-/// State of a running stream.
-struct Run {
+/// A running stream.
+struct Run<'m> {
     summary: Summary,
-    under_way: VecDeque<Sent>,
+    /// Time in which the chip had something to answer.
+    busy: Duration,
+    mirror: Option<Mirror<'m>>,
+    chip: &'m ChipModel,
     truth: Option<String>,
     decided: bool,
 }
 
-impl Run {
-    fn take(&mut self, outcome: Outcome, chip: &ChipModel) -> Result<Update, ChipProblem> {
-        match (self.under_way.pop_front(), outcome) {
-            (Some(Sent::Touch { touch, expected, .. }), Outcome::Refused(refusal)) if refusal.is_of_a_touch() => {
+impl Run<'_> {
+    /// Asks the chip, and adds up how long the answer takes.
+    fn timed<T>(&mut self, ask: impl FnOnce() -> Result<T>) -> Result<T> {
+        let began = Instant::now();
+        let answered = ask();
+        self.busy += began.elapsed();
+        answered
+    }
+
+    fn reset(&mut self, connection: &mut Connection, name: Option<String>) -> Result<Update> {
+        self.timed(|| connection.reset())?;
+        if let Some(mirror) = &mut self.mirror {
+            // Without a model it has nothing to forget.
+            let _ = mirror.reset();
+        }
+        self.end_object();
+        self.truth.clone_from(&name);
+        Ok(Update::Object(name))
+    }
+
+    fn touch(&mut self, connection: &mut Connection, touch: Touch) -> Result<Update> {
+        if touch.position().is_some() && !self.chip.info.has_maps() {
+            return Err(connection.refused(Refusal::Position));
+        }
+        let answered = self.timed(|| connection.touch(&touch))?;
+        let mut posteriors = None;
+        if let Some(mirror) = &mut self.mirror {
+            let expected = match touch.position() {
+                Some(Position { micrometers }) => mirror.press(&touch, micrometers, true),
+                None => mirror.push(&touch, true),
+            };
+            let objects = 0..=self.chip.info.last_object;
+            posteriors = Some(objects.map(|object| mirror.posterior(object).map_or(0.0, probability)).collect());
+            self.summary.compared += 1;
+            self.compare(&touch, &expected, &answered);
+        }
+        Ok(match answered {
+            Err(refusal) => {
                 self.summary.refused += 1;
-                self.compare(&touch, expected, Err(refusal));
-                Ok(Update::Refused { touch, refusal })
+                Update::Refused { touch, refusal }
             }
-            (_, Outcome::Refused(refusal)) => Err(ChipProblem::Refused(refusal)),
-            (Some(Sent::Object(name)), Outcome::Done) => {
-                self.end_object(chip);
-                self.truth.clone_from(&name);
-                Ok(Update::Object(name))
-            }
-            (Some(Sent::Touch { touch, expected, posteriors }), Outcome::Verdict(verdict)) => {
+            Ok(verdict) => {
                 self.summary.touches += 1;
-                self.compare(&touch, expected, Ok(verdict));
                 let decided = verdict.decision != Decision::Undecided && !self.decided;
                 if decided {
                     self.decided = true;
-                    self.count(verdict.decision, chip);
+                    self.count(verdict.decision);
                 }
-                Ok(Update::Touch { touch, verdict, decided, posteriors })
+                Update::Touch { touch, verdict, decided, posteriors }
             }
-            _ => Err(ChipProblem::UnexpectedAnswer),
-        }
+        })
     }
 
-    fn compare(
-        &mut self,
-        touch: &Touch,
-        expected: Option<Result<VerdictMessage, Refusal>>,
-        verdict: Result<VerdictMessage, Refusal>,
-    ) {
-        let Some(expected) = expected else { return };
-        self.summary.compared += 1;
-        if expected != verdict {
+    fn next_approach(&mut self, connection: &mut Connection) -> Result<Update> {
+        let answered = self.timed(|| connection.next_approach())?;
+        if let Some(mirror) = &self.mirror {
+            let expected = mirror.next_approach(&[0; POSE_BYTES]);
+            self.summary.approaches += 1;
+            self.compare(&"the approach", &expected, &answered);
+        }
+        answered.map(Update::Next).map_err(|refusal| connection.refused(refusal))
+    }
+
+    fn locate(&mut self, connection: &mut Connection, within: Option<u32>, is_open: bool) -> Result<Update> {
+        let located = |(place, poses): (PlaceMessage, Vec<Pose>), next| {
+            let PlaceMessage { table_alone, exhausted, .. } = place;
+            Located { table_alone, exhausted, poses, next }
+        };
+        let answered = self.timed(|| {
+            let found = connection.places()?;
+            Ok(located(found, if is_open { Some(connection.next_press(within)?) } else { None }))
+        })?;
+        if let Some(mirror) = &mut self.mirror {
+            let found = places(|rank| mirror.place(rank));
+            let next = is_open.then(|| mirror.next_press(within)).transpose();
+            let expected = found.and_then(|found| Ok(located(found, next?)));
+            self.summary.approaches += 1;
+            self.compare(&"the place", &expected, &Ok(answered.clone()));
+        }
+        Ok(Update::Located(answered))
+    }
+
+    /// Counts a difference between what the host expects and what the chip answers.
+    fn compare<T: PartialEq + Debug>(&mut self, what: &dyn Debug, expected: &T, answered: &T) {
+        if expected != answered {
             self.summary.differences += 1;
             let number = self.summary.touches + self.summary.refused;
-            let difference = || format!("touch {number}, {touch:?}: the host says {expected:?}, the chip {verdict:?}");
+            let difference =
+                || format!("after touch {number}, {what:?}: the host says {expected:?}, the chip {answered:?}");
             self.summary.first_difference.get_or_insert_with(difference);
         }
     }
 
-    fn compare_answers<T: PartialEq + Debug>(&mut self, expected: Option<T>, answer: &T) {
-        let Some(expected) = expected else { return };
-        self.summary.approaches += 1;
-        if expected != *answer {
-            self.summary.differences += 1;
-            let number = self.summary.touches + self.summary.refused;
-            let difference = || format!("after touch {number} the host says {expected:?}, the chip {answer:?}");
-            self.summary.first_difference.get_or_insert_with(difference);
-        }
-    }
-
-    fn count(&mut self, decision: Decision, chip: &ChipModel) {
+    fn count(&mut self, decision: Decision) {
         let Some(truth) = &self.truth else { return };
         let said = match decision {
-            Decision::Recognized(object) => chip.names.get(usize::from(object)),
+            Decision::Recognized(object) => self.chip.names.get(usize::from(object)),
             _ => None,
         };
         match said {
@@ -377,27 +328,9 @@ impl Run {
         }
     }
 
-    fn end_object(&mut self, chip: &ChipModel) {
+    fn end_object(&mut self) {
         if !std::mem::take(&mut self.decided) && self.truth.is_some() {
-            self.count(Decision::GaveUp, chip);
+            self.count(Decision::GaveUp);
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn waiting_for_the_next_touch_does_not_count_as_time_of_the_chip() {
-        let start = Instant::now();
-        let at = |seconds| start + Duration::from_secs(seconds);
-        let mut busy = Busy::default();
-        for (is_busy, seconds) in
-            [(false, 5), (true, 10), (true, 11), (false, 12), (false, 100), (true, 200), (false, 203)]
-        {
-            busy.set(is_busy, at(seconds));
-        }
-        assert_eq!(busy.total, Duration::from_secs(2 + 3));
     }
 }

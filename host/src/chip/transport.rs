@@ -1,7 +1,7 @@
 //! Bytes to and from a chip.
 
-use super::qemu::Qemu;
-use crate::error::{ChipProblem, Error, Place, Result};
+use super::qemu::{self, Qemu};
+use crate::error::{Error, Kind, Place, Result, problem};
 use crossbeam_channel::{Receiver, RecvTimeoutError};
 use std::io::{ErrorKind, Read, Write};
 use std::time::Duration;
@@ -63,7 +63,7 @@ impl Transport {
     pub fn reset_chip(&mut self) -> Result<()> {
         match &self.emulator {
             Some(emulator) => emulator.reset(),
-            None => Err(Error::variant_at(Place::file(&self.name), ChipProblem::NoReset)),
+            None => Err(qemu::no_reset().at(Place::file(&self.name))),
         }
     }
 
@@ -92,13 +92,20 @@ impl Transport {
     /// The error for a line that broke.
     fn lost(&mut self, source: &std::io::Error) -> Error {
         let problem = match &mut self.emulator {
-            Some(emulator) => ChipProblem::EmulatorEnded { said: emulator.end() },
-            None if source.kind() == ErrorKind::UnexpectedEof => {
-                ChipProblem::Lost { reason: "the other end closed it".into() }
+            Some(emulator) => problem!("the emulator ended{}", qemu::after_colon(&emulator.end()))
+                .fix("Check that the firmware image is an ELF file for the emulated machine."),
+            None => {
+                let reason = match source.kind() {
+                    ErrorKind::UnexpectedEof => "the other end closed it".into(),
+                    _ => source.to_string(),
+                };
+                problem!("the connection to the chip was lost: {reason}").as_kind(Kind::Lost).fix(
+                    "Check the cable and the chip's power, or the program at the other end of a TCP connection; then \
+                     start again.",
+                )
             }
-            None => ChipProblem::Lost { reason: source.to_string() },
         };
-        Error::variant_at(Place::file(&self.name), problem)
+        problem.at(Place::file(&self.name))
     }
 }
 

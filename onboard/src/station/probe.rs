@@ -266,15 +266,15 @@ impl<'m, const N: usize, S: Storage> ProbeStation<'m, N, S> {
     /// Microseconds from `now`, the time that [`Sensed::Nothing`] said last, for which there is nothing to do without an
     /// interrupt: at most [`LONGEST_WAIT`], so that any timer can be set to it and none overflows.
     pub fn wait(&self, now: u32) -> u32 {
-        self.effector.due(now).map_or(LONGEST_WAIT, |due| due.min(LONGEST_WAIT))
+        [self.effector.due(now), self.end.wait(now)].into_iter().flatten().fold(LONGEST_WAIT, u32::min)
     }
 
     /// Does what there is to do, `None` if that is nothing: takes bytes from the host, then looks at the switches, so that
     /// neither waits for the other. Of two things that happened it returns the touch or fault.
     ///
     /// # Errors
-    /// The link's, with what happened all the same. Call it again. What could not be sent is lost; the host notices, and asks
-    /// again for what it waits for.
+    /// The link's, with what happened all the same. Call it again. What could not be sent is sent again: an answer when the host asks
+    /// again, a touch until the host has heard it.
     pub fn step<B: Board>(&mut self, board: &mut B) -> Result<Option<Happened>, LinkFailed<B::Error>> {
         let mut line = Line { board, failed: None, sends: true };
         if !core::mem::replace(&mut self.started, true) {
@@ -288,6 +288,9 @@ impl<'m, const N: usize, S: Storage> ProbeStation<'m, N, S> {
         }
         let heard = (!bytes.is_empty()).then_some(Happened::Heard);
         let sensed = drain(&mut self.effector, || line.board.sense());
+        if let Some(now) = self.effector.now() {
+            self.end.tick(now, |frame| line.send(frame));
+        }
         let happened = match sensed {
             Ok(Some(touch)) => {
                 self.course.touched();
@@ -338,11 +341,11 @@ impl<'m, const N: usize, S: Storage> ProbeStation<'m, N, S> {
         let pose_age = announced.map(|(_, age)| age);
         // Touches from the host may have decided: one that counts begins another object.
         if self.station.has_decided() && self.station.model().is_some_and(|model| model.accepts(&touch).is_ok()) {
-            self.station.reset();
+            let _ = self.station.reset();
         }
         let outcome = self.station.push(&touch, self.settings.detail);
         if outcome.is_ok_and(|verdict| verdict.decision != Decision::Undecided) {
-            self.station.reset();
+            let _ = self.station.reset();
         }
         let event = match outcome {
             Ok(verdict) => Event::Touch { touch: TouchMessage::from(&touch), pose_age, verdict },

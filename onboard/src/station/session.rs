@@ -1,17 +1,17 @@
-//! A model in use, and the commands it can be given.
+//! A model in use, and the requests it answers.
 
 use super::message::{decision, refusal};
-use super::storage::{Loaded, NoStorage, Place, Storage};
+use super::storage::{Loaded, NoStorage, NotStored, Place, Storage};
 use super::table::Locates;
 use crate::decide::State;
 use crate::model::Opened;
 use crate::{Model, Recognizer, Stopping, Verdict};
-use palpate_shared::Touch;
-use palpate_shared::link::{
-    ApproachMessage, Detail, Device, ModelInfo, Outcome, POSE_BYTES, Refusal, VerdictMessage, checksum,
-};
 #[cfg(feature = "locate")]
-use palpate_shared::{Approach, TablePose};
+use palpate_shared::Approach;
+use palpate_shared::Touch;
+#[cfg(feature = "locate")]
+use palpate_shared::link::PlaceMessage;
+use palpate_shared::link::{ApproachMessage, Detail, Device, ModelInfo, POSE_BYTES, Refusal, VerdictMessage, checksum};
 
 /// Default name of programs on the link: this crate and its version.
 pub const PROGRAM: &str = concat!("palpate-onboard ", env!("CARGO_PKG_VERSION"));
@@ -262,22 +262,29 @@ impl<'m, const N: usize, S: Storage, L: Locates> Station<'m, N, S, L> {
         Ok(())
     }
 
-    /// Takes the next part of the arriving model.
-    fn take(&mut self, offset: u32, bytes: &[u8]) -> Result<Outcome, Refusal> {
+    /// Takes the next part of the arriving model, and says which byte comes next.
+    fn take(&mut self, offset: u32, bytes: &[u8]) -> Result<u32, Refusal> {
         let staged = self.staged.filter(|staged| staged.received == offset).ok_or(Refusal::OutOfOrder)?;
         let start = usize::try_from(offset).map_err(|_| Refusal::TooLong)?;
         let end = start.checked_add(bytes.len()).and_then(|end| u32::try_from(end).ok());
-        let received = end.filter(|&end| end <= staged.length).ok_or(Refusal::TooLong)?;
+        let end = end.filter(|&end| end <= staged.length).ok_or(Refusal::TooLong)?;
         let place = self.next_place();
-        if self.storage.write_model(place, start, bytes).is_ok() {
-            self.staged = Some(Staged { received, ..staged });
-            return Ok(Outcome::Done);
+        let received = match self.storage.write_model(place, start, bytes) {
+            Ok(()) => end,
+            // Words that are half written cannot be written again before their sector is erased, and what precedes them goes too.
+            Err(NotStored) => {
+                let before = start.checked_rem(self.storage.sector()).and_then(|before| u32::try_from(before).ok());
+                offset.saturating_sub(before.unwrap_or(0))
+            }
+        };
+        let staged = Staged { received, ..staged };
+        if received == staged.length {
+            self.staged = None;
+            self.accept(staged)?;
+        } else {
+            self.staged = Some(staged);
         }
-        // Words that are half written cannot be written again before their sector is erased, and what precedes them goes too.
-        let before = start.checked_rem(self.storage.sector()).and_then(|before| u32::try_from(before).ok());
-        let offset = offset.saturating_sub(before.unwrap_or(0));
-        self.staged = Some(Staged { received: offset, ..staged });
-        Ok(Outcome::Continue { offset })
+        Ok(received)
     }
 }
 
@@ -292,52 +299,41 @@ fn bytes_at<'b>(built_in: &'b [u8], storage: &'b impl Storage, source: Source) -
     }
 }
 
-fn outcome(result: Result<(), Refusal>) -> Outcome {
-    result.map_or_else(Outcome::Refused, |()| Outcome::Done)
-}
-
 impl<const N: usize, S: Storage, L: Locates> Device for Station<'_, N, S, L> {
-    fn touch(&mut self, touch: &Touch, detail: bool) -> Outcome {
-        self.push(touch, detail).map_or_else(Outcome::Refused, Outcome::Verdict)
+    fn touch(&mut self, touch: &Touch, detail: bool) -> Result<VerdictMessage, Refusal> {
+        self.push(touch, detail)
     }
 
-    fn press(&mut self, touch: &Touch, position: [i32; 3], detail: bool) -> Outcome {
-        Self::press(self, touch, position, detail).map_or_else(Outcome::Refused, Outcome::Verdict)
+    fn press(&mut self, touch: &Touch, position: [i32; 3], detail: bool) -> Result<VerdictMessage, Refusal> {
+        Self::press(self, touch, position, detail)
     }
 
-    fn reset(&mut self) -> Outcome {
+    fn reset(&mut self) -> Result<(), Refusal> {
         let bytes = bytes_at(self.built_in, &self.storage, self.source);
         let reset = self.located.reset(bytes);
-        outcome(reset.or_else(|_| self.with(|recognizer| recognizer.reset())))
+        reset.or_else(|_| self.with(|recognizer| recognizer.reset()))
     }
 
-    fn begin(&mut self, length: u32, checksum: u32) -> Outcome {
-        if let Some(staged) = self.staged.take()
-            && (staged.length, staged.checksum) == (length, checksum)
-            && staged.received > 0
-        {
-            self.staged = Some(staged);
-            return Outcome::Continue { offset: staged.received };
-        }
+    fn begin(&mut self, length: u32, checksum: u32) -> Result<u32, Refusal> {
         let room = self.storage.room();
-        outcome(if room == 0 {
+        if room == 0 {
             // No smaller model would fit either.
-            Err(Refusal::Unsupported)
-        } else if usize::try_from(length).is_ok_and(|length| length <= room) {
-            self.staged = Some(Staged { length, checksum, received: 0 });
-            Ok(())
-        } else {
-            Err(Refusal::TooLong)
-        })
+            return Err(Refusal::Unsupported);
+        }
+        if length == 0 {
+            return Err(Refusal::Invalid);
+        }
+        if usize::try_from(length).map_or(true, |length| length > room) {
+            return Err(Refusal::TooLong);
+        }
+        let same = self.staged.filter(|staged| (staged.length, staged.checksum) == (length, checksum));
+        let staged = same.unwrap_or(Staged { length, checksum, received: 0 });
+        self.staged = Some(staged);
+        Ok(staged.received)
     }
 
-    fn chunk(&mut self, offset: u32, bytes: &[u8]) -> Outcome {
-        self.take(offset, bytes).unwrap_or_else(Outcome::Refused)
-    }
-
-    fn commit(&mut self) -> Outcome {
-        let complete = self.staged.take_if(|staged| staged.received == staged.length);
-        outcome(complete.ok_or(Refusal::OutOfOrder).and_then(|staged| self.accept(staged)))
+    fn chunk(&mut self, offset: u32, bytes: &[u8]) -> Result<u32, Refusal> {
+        self.take(offset, bytes)
     }
 
     fn model(&self) -> Option<ModelInfo> {
@@ -386,7 +382,7 @@ impl<const N: usize, S: Storage, L: Locates> Device for Station<'_, N, S, L> {
     }
 
     #[cfg(feature = "locate")]
-    fn place(&mut self, rank: u8) -> Result<(bool, Option<TablePose>), Refusal> {
+    fn place(&mut self, rank: u8) -> Result<PlaceMessage, Refusal> {
         self.located.place(bytes_at(self.built_in, &self.storage, self.source), rank)
     }
 

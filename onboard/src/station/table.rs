@@ -1,13 +1,13 @@
 //! Models of maps in a station: touches with a position, and the place of an object.
 
+use palpate_shared::Touch;
 use palpate_shared::link::{ModelInfo, Refusal, VerdictMessage};
-use palpate_shared::{Approach, TablePose, Touch};
 #[cfg(feature = "locate")]
 use {
     super::message::decision,
     crate::locate::{Cell, Effort, Hand, Locator, Maps, POSE},
-    palpate_shared::Position,
-    palpate_shared::link::Detail,
+    palpate_shared::link::{Detail, PlaceMessage},
+    palpate_shared::{Approach, Position, TablePose},
 };
 
 /// Room for models of maps in a [`Station`](super::Station): `()` has none, a `&mut` [`Table`] has. Every call after
@@ -60,11 +60,12 @@ pub trait Locates {
         None
     }
 
-    /// True if no finger met more than the table, and the place of this rank of the recognized object, or else of the most likely one.
+    /// The place of this rank of the recognized object, or else of the most likely one.
     ///
     /// # Errors
     /// [`Refusal::NoModel`] without maps.
-    fn place(&mut self, _: &[u8], _: u8) -> Result<(bool, Option<TablePose>), Refusal> {
+    #[cfg(feature = "locate")]
+    fn place(&mut self, _: &[u8], _: u8) -> Result<PlaceMessage, Refusal> {
         Err(Refusal::NoModel)
     }
 
@@ -73,6 +74,7 @@ pub trait Locates {
     ///
     /// # Errors
     /// [`Refusal::NoModel`] without maps.
+    #[cfg(feature = "locate")]
     fn next_press(&mut self, _: &[u8], _: Option<u32>) -> Result<Approach, Refusal> {
         Err(Refusal::NoModel)
     }
@@ -206,12 +208,16 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locates for
     }
 
     #[inline(never)]
-    fn place(&mut self, model: &[u8], rank: u8) -> Result<(bool, Option<TablePose>), Refusal> {
+    fn place(&mut self, model: &[u8], rank: u8) -> Result<PlaceMessage, Refusal> {
         self.with(model, |locator, _| {
             let (mut poses, rank) = ([TablePose::default(); PLACES], usize::from(rank));
             let poses = if locator.touches() == 0 { None } else { poses.get_mut(..=rank) }.unwrap_or_default();
             let found = locator.poses(locator.best(), poses);
-            (locator.met_table_alone(), poses.get(..found).and_then(|found| found.get(rank)).copied())
+            PlaceMessage {
+                table_alone: locator.met_table_alone(),
+                exhausted: locator.exhausted().is_some(),
+                place: poses.get(..found).and_then(|found| found.get(rank)).copied(),
+            }
         })
     }
 

@@ -5,13 +5,13 @@ use crate::checksum::checksum;
 use cobs::{DecodeResult, DecoderState};
 
 /// The version of frames and messages. A frame of another version is not read.
-pub const VERSION: u8 = 3;
+pub const VERSION: u8 = 4;
 
 /// Version and session.
 const HEADER: usize = 5;
 /// CRC-32.
 const TRAILER: usize = 4;
-/// The longest message: a chunk and what stands around it.
+/// The longest message: a chunk, or an answer, and what stands around it.
 const MESSAGE_MAX: usize = super::CHUNK + 32;
 const DECODED_MAX: usize = HEADER + MESSAGE_MAX + TRAILER;
 
@@ -21,7 +21,7 @@ pub const FRAME_MAX: usize = DECODED_MAX + 3;
 /// A message and the session it belongs to.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame<'a> {
-    /// The session's number; 0 before one is open.
+    /// The host's session; in an event the current one, 0 before one is open.
     pub session: u32,
     /// The message.
     pub message: Message<'a>,
@@ -44,7 +44,7 @@ pub enum FrameError {
 /// Writes a frame into `out` and returns its bytes: 0x00, the frame, 0x00. The leading 0x00 ends whatever the line held
 /// before.
 ///
-/// Cost: some instructions for each byte, most of them for COBS. Returns nothing if the message is longer than any that [`Command`](super::Command)
+/// Cost: some instructions for each byte, most of them for COBS. Returns nothing if the message is longer than any that [`Request`](super::Request)
 /// and its like allow: a chunk of more than [`CHUNK`](super::CHUNK) bytes.
 pub fn encode<'o>(frame: &Frame<'_>, out: &'o mut [u8; FRAME_MAX]) -> &'o [u8] {
     let mut plain = [0; DECODED_MAX];

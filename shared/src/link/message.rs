@@ -12,62 +12,42 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Message<'a> {
-    /// Host: a question; the tag comes back with the answer.
-    Query {
-        /// Any number.
-        tag: u8,
-        /// The question.
-        query: Query,
+    /// Host: do or say this.
+    Request {
+        /// One more than the request before; the same where it is repeated.
+        number: u32,
+        /// The request.
+        #[serde(borrow)]
+        request: Request<'a>,
     },
-    /// Chip: the answer to the question with this tag.
+    /// Chip: the answer to the request of this number.
     Answer {
-        /// The session of the question's frame: that of the host that asked, whichever is open.
-        asker: u32,
-        /// The question's number.
-        tag: u8,
+        /// The request's number.
+        number: u32,
         /// The answer.
         #[serde(borrow)]
         answer: Answer<'a>,
     },
-    /// Host: do this.
-    Command {
-        /// Counts commands from 0 in a session.
-        sequence: u32,
-        /// The command.
-        #[serde(borrow)]
-        command: Command<'a>,
-    },
-    /// Chip: the result of a command.
-    Outcome {
-        /// The command's number.
-        sequence: u32,
-        /// The result.
-        outcome: Outcome,
-    },
-    /// Chip: a command came that is not the next one, or not of the session that this frame is of.
-    Expected {
-        /// The number of the next command.
-        sequence: u32,
-    },
-    /// Chip: something happened without a command.
+    /// Chip: something happened without a request; repeated until the host has heard it.
     Event {
-        /// The chip's boot number, another one after each start.
-        boot: u32,
-        /// Counts events from 0 since that start.
-        sequence: u32,
+        /// Counts events from 0 since the chip's start.
+        number: u32,
         /// The event.
         event: Event,
     },
+    /// Host: the event of this number has arrived.
+    Heard {
+        /// The event's number.
+        number: u32,
+    },
 }
 
-/// A question, which changes nothing on the chip; only [`Query::Open`] does, once.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// Something for the chip to do or to say, exactly once.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
-pub enum Query {
-    /// Asks for the current session.
-    Hello,
-    /// Open the session of this frame if the current one is `previous`.
-    Open {
+pub enum Request<'a> {
+    /// Asks for the current session, and opens that of this frame if the current one is `previous`.
+    Hello {
         /// The session that the host believes to be current.
         previous: u32,
         /// The chip's boot number as the host knows it: a late copy opens nothing after a reset.
@@ -75,27 +55,61 @@ pub enum Query {
     },
     /// Asks for the model in use.
     Model,
+    /// A model is about to come: asks which byte to begin with.
+    Begin {
+        /// Its bytes in all.
+        length: u32,
+        /// Its CRC-32 (ISO-HDLC).
+        checksum: u32,
+    },
+    /// Part of it; the last one has the chip check it and use it. Until then, and if the check fails, what was there before
+    /// stays in use.
+    Chunk {
+        /// Offset of the part: the one that the chip asked for.
+        offset: u32,
+        /// At most [`CHUNK`](super::CHUNK) bytes.
+        bytes: &'a [u8],
+    },
+    /// Take a touch into account.
+    Touch {
+        /// The touch.
+        touch: TouchMessage,
+        /// True if the answer should have a [`Detail`].
+        detail: bool,
+    },
+    /// Take a touch with a position into account. This and all others of maps are for a chip that
+    /// [has maps](ModelInfo::has_maps) alone.
+    Press {
+        /// The touch; its pose is in the table's frame.
+        touch: TouchMessage,
+        /// The hand's position in the table's frame: x, y and z in micrometers, i32 little endian.
+        position: [u8; 12],
+        /// True if the answer should have a [`Detail`].
+        detail: bool,
+    },
+    /// Forget all touches: another object comes.
+    Reset,
     /// Asks for the name of an object.
     Name {
         /// The object's index in the model.
         object: u8,
     },
+    /// Asks for the program that the chip runs.
+    Program,
     /// Asks for the counts of the link.
-    Statistics,
-    /// Asks for the posteriors of up to [`CHUNK`](super::CHUNK) / 8 objects.
+    Counts,
+    /// Asks for the posteriors of as many objects as fit into an answer.
     Posteriors {
-        /// From this object on.
+        /// The first of them.
         first: u8,
     },
-    /// Asks for the pose of the next approach. A chip whose program is older than this question does not answer it.
+    /// Asks for the pose of the next approach.
     NextApproach {
         /// Poses that the robot cannot reach: pose n is bit n % 8 of byte n / 8. Zeros: it can reach all.
         without: [u8; POSE_BYTES],
     },
-    /// Asks for the program that the chip runs. A chip whose program is older than this question does not answer it.
-    Program,
-    /// Asks for a place where the most likely object lies. Only a chip that [has maps](ModelInfo::has_maps) answers this and the
-    /// two that follow, which take no flash without the feature `position`.
+    /// Asks for a place where the most likely object lies. Like the two that follow, it takes no flash without the feature
+    /// `position`.
     #[cfg(any(test, feature = "position"))]
     Place {
         /// Rank of the place, from 0.
@@ -116,87 +130,9 @@ pub enum Query {
     },
 }
 
-/// The answer to a [`Query`].
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[non_exhaustive]
-pub enum Answer<'a> {
-    /// To [`Query::Hello`] and [`Query::Open`]: the current session is that of this frame.
-    Session {
-        /// The number of its next command.
-        next: u32,
-        /// The chip's boot number.
-        boot: u32,
-    },
-    /// To [`Query::Model`].
-    Model(ModelInfo),
-    /// To [`Query::Name`].
-    Name(&'a str),
-    /// To [`Query::Statistics`].
-    Statistics(Statistics),
-    /// To [`Query::Posteriors`]: u64 in Q56, little endian, one after another.
-    Posteriors(&'a [u8]),
-    /// There is no answer.
-    Refused(Refusal),
-    /// To [`Query::NextApproach`].
-    NextApproach(ApproachMessage),
-    /// To [`Query::Program`]: name and version; empty if it does not say.
-    Program(&'a str),
-    /// To [`Query::Place`].
-    #[cfg(any(test, feature = "position"))]
-    Place {
-        /// True if no finger met more than the table so far.
-        table_alone: bool,
-        /// The place; none before the first touch, and if there are not as many.
-        place: Option<TablePose>,
-    },
-    /// To [`Query::NextPress`].
-    #[cfg(any(test, feature = "position"))]
-    NextPress(Approach),
-}
-
-/// Something to do, exactly once.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[non_exhaustive]
-pub enum Command<'a> {
-    /// Take a touch into account.
-    Touch {
-        /// The touch.
-        touch: TouchMessage,
-        /// True if the outcome should have a [`Detail`].
-        detail: bool,
-    },
-    /// Forget all touches: another object comes.
-    Reset,
-    /// A model is about to come, in chunks.
-    Begin {
-        /// Its bytes in all.
-        length: u32,
-        /// Its CRC-32 (ISO-HDLC).
-        checksum: u32,
-    },
-    /// Part of it; chunks come in order.
-    Chunk {
-        /// Offset of the part.
-        offset: u32,
-        /// At most [`CHUNK`](super::CHUNK) bytes.
-        bytes: &'a [u8],
-    },
-    /// It is complete: check it and use it. Until then, and if the check fails, what was there before stays in use.
-    Commit,
-    /// Take a touch with a position into account. Only a chip that [has maps](ModelInfo::has_maps) is sure to understand it.
-    Press {
-        /// The touch; its pose is in the table's frame.
-        touch: TouchMessage,
-        /// The hand's position in the table's frame: x, y and z in micrometers, i32 little endian.
-        position: [u8; 12],
-        /// True if the outcome should have a [`Detail`].
-        detail: bool,
-    },
-}
-
 #[cfg(feature = "position")]
-impl Command<'_> {
-    /// The command that takes a touch into account, with its position if it has one.
+impl Request<'_> {
+    /// The request that takes a touch into account, with its position if it has one.
     pub fn of_touch(touch: &Touch, detail: bool) -> Self {
         let (message, mut position) = (TouchMessage::from(touch), [0; 12]);
         let Some(crate::Position { micrometers }) = touch.position() else {
@@ -207,23 +143,62 @@ impl Command<'_> {
     }
 }
 
-/// The result of a [`Command`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// The answer to a [`Request`].
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
-pub enum Outcome {
-    /// The command is done; for commands without a touch.
+pub enum Answer<'a> {
+    /// To [`Request::Hello`].
+    Session {
+        /// The current session.
+        session: u32,
+        /// The chip's boot number, another one after each start.
+        boot: u32,
+        /// Number of the chip's next event.
+        event: u32,
+    },
+    /// The chip does not know the request's session: it was reset, or another host has opened one.
+    Forgotten,
+    /// It was not done, or there is no answer.
+    Refused(Refusal),
+    /// It is done.
     Done,
     /// Verdict after a touch.
     Verdict(VerdictMessage),
-    /// It was not done.
-    Refused(Refusal),
-    /// To [`Command::Begin`] and [`Command::Chunk`]: all before this offset has arrived. Chunks from it on are to come, once those
-    /// under way were refused; so no chunk goes out before the outcome of its beginning. A chip answers so when a load that was
-    /// interrupted begins again, and when a chunk could not be written: flash is written again from the start of a sector.
-    Continue {
+    /// To [`Request::Begin`] and [`Request::Chunk`]: all before this offset has arrived; where that is the model's length, it is in
+    /// use. The offset is that of an earlier byte where a chunk could not be written: flash is written again from the start of a
+    /// sector. It is not 0 where a load that was interrupted begins again.
+    Wanted {
         /// Offset of the next chunk.
         offset: u32,
     },
+    /// To [`Request::Model`].
+    Model(ModelInfo),
+    /// A name; that of a program is with its version, or empty if it does not say.
+    Name(&'a str),
+    /// To [`Request::Counts`].
+    Counts(Statistics),
+    /// To [`Request::Posteriors`]: u64 in Q56, little endian, one after another.
+    Posteriors(&'a [u8]),
+    /// To [`Request::NextApproach`].
+    NextApproach(ApproachMessage),
+    /// To [`Request::Place`].
+    #[cfg(any(test, feature = "position"))]
+    Place(PlaceMessage),
+    /// To [`Request::NextPress`].
+    #[cfg(any(test, feature = "position"))]
+    NextPress(Approach),
+}
+
+/// A place where the most likely object lies.
+#[cfg(any(test, feature = "position"))]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PlaceMessage {
+    /// True if no finger met more than the table so far.
+    pub table_alone: bool,
+    /// True if the search after the last touch was not finished.
+    pub exhausted: bool,
+    /// The place; none before the first touch, and if there are not as many.
+    pub place: Option<TablePose>,
 }
 
 /// Reason why the chip refused.
@@ -235,7 +210,7 @@ pub enum Refusal {
     NoModel,
     /// It does not fit into the chip's memory.
     TooLong,
-    /// A chunk came without a beginning, or not in order.
+    /// A chunk came without a beginning, or another one than the chip asked for.
     OutOfOrder,
     /// The data that arrived differ from the announcement.
     Checksum,
@@ -307,7 +282,7 @@ impl core::fmt::Display for Refusal {
     }
 }
 
-/// Something that happened on the chip without a command.
+/// Something that happened on the chip without a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Event {
@@ -439,8 +414,20 @@ pub enum Decision {
     Recognized(u8),
     /// No object of the model: the touches fit none.
     Unknown,
-    /// Nothing, and the limit of touches is reached. Chips whose programs are older said unknown then.
+    /// Nothing, and the limit of touches is reached.
     GaveUp,
+}
+
+impl Decision {
+    /// Its name in lines for programs.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Undecided => "undecided",
+            Self::Recognized(_) => "recognized",
+            Self::Unknown => "unknown",
+            Self::GaveUp => "gave-up",
+        }
+    }
 }
 
 /// An approach that a chip proposes.
@@ -530,12 +517,10 @@ pub struct Statistics {
     pub frames: u32,
     /// Frames that were garbled or too long, or no message of this version.
     pub garbled: u32,
-    /// Commands that had been executed before: repetitions and duplicate frames.
+    /// Requests that had been answered before, and were answered again.
     pub repeated: u32,
-    /// Commands that came before the one that was expected: something was lost in between.
-    pub early: u32,
-    /// Commands of another session.
-    pub foreign: u32,
+    /// Requests that came too late: of another session, or before the last one.
+    pub late: u32,
     /// Touches that were not counted because the model was not trained for them.
     pub refused: u32,
 }

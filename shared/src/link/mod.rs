@@ -13,32 +13,33 @@
 //!
 //! | from | message | delivery |
 //! |---|---|---|
-//! | host | [`Command`]: touch, press, reset, load | numbered, executed exactly once and in order |
-//! | chip | [`Outcome`]: verdict, done, refused | repeated on demand for the last [`WINDOW`] commands |
-//! | host | [`Query`]: model, names, posteriors, places, statistics, next approach, program | changes nothing, repeated until answered |
-//! | chip | [`Answer`] | |
-//! | chip | [`Event`]: its own touches, faults, power-up | numbered, so that the host knows how many it missed |
+//! | host | [`Request`]: hello, model, load, touch, press, reset, next approach, names, program, counts, posteriors, places | numbered; repeated until answered |
+//! | chip | [`Answer`] | with the request's number |
+//! | chip | [`Event`]: its own touches, faults, power-up | numbered from its start; repeated until heard |
+//! | host | heard | with the event's number |
 //!
-//! A host opens a session, whose number is in every frame. Within it, commands are numbered from 0. The chip executes only
-//! the command that it expects next. An earlier one is a repetition, and its outcome is sent again; a later one shows that
-//! something was lost, and the chip says which one it expects. The host keeps up to [`WINDOW`] commands under way and
-//! repeats those that stay without an outcome. So a command is executed once, even if the line loses, duplicates, garbles
-//! or delays frames. After a reset the chip knows of no session: it executes none of its commands, and the host, which asks, hears
-//! that the session and all evidence are gone.
+//! Each side has one frame under way, and waits for what it is answered. The chip executes a request if its number is one more than that of
+//! the last one. If it is the same, the host has not heard the answer: the chip sends the same bytes again and does nothing else. Any
+//! other number is a late copy, which says nothing new. So a touch is counted once, even if the line loses, doubles, garbles or delays
+//! frames. The host takes an event once by its number in the same way.
 //!
-//! A session's number is a random number of the host's, so that two hosts never believe that the same session is theirs.
-//! Opening names the session that the host believes to be current and the chip's boot number, so that a late copy of an
-//! opening cannot open again. A boot number also comes with every event: events are counted from the chip's start, and
-//! the host notices a start even if the event that announces it was lost.
+//! The chip keeps [`EVENTS`] events that no host has heard. If there are more, it gives up the oldest; the next event's number tells the
+//! host how many it missed.
 //!
-//! Touches with a position ([`Command::Press`]), and the questions about the place of an object, came to this version later. A
-//! chip whose program is older does not read them, and refuses to load maps. So a host looks first whether the chip
-//! [has maps](ModelInfo::has_maps); an older host takes those for a model of rows, and sends it nothing.
+//! A host opens a session, whose number is in each of its frames and in the answers to them. It is a random number of the host's, so that two
+//! hosts never believe that the same session is theirs; several may listen to one chip. Hello names the session that the host believes to
+//! be current and the chip's boot number, and opens a session only where both are right; so a late copy of a hello cannot open one
+//! again. After a reset the chip knows of no session: it executes none of its requests, and says that it is forgotten.
 //!
-//! An answer names the session of the host that asked, so that several hosts may listen to one chip.
+//! Touches with a position ([`Request::Press`]) and requests about the place of an object are only for a chip that
+//! [has maps](ModelInfo::has_maps); others may be built without them, and do not answer.
 //!
-//! [`DeviceEnd`] and [`HostEnd`] do this without a transport or a clock: bytes go in, bytes come out. Over an
-//! [`embedded_io`] transport: [`DeviceEnd::serve`] and [`HostEnd::exchange`].
+//! [`DeviceEnd`] and [`HostEnd`] do this without a transport: bytes go in, bytes come out, and whoever calls them says what time it is.
+//!
+//! # Costs
+//!
+//! [`CHUNK`] bytes of a model are in one request. At 115,200 baud a model of 27,251 bytes takes 3.2 s, 0.5 s of which are answers that come
+//! after 5 ms each. The longest frame takes [`FRAME_MAX`] bytes of RAM: twice in a [`DeviceEnd`], twice on the stack while it answers.
 
 mod device;
 mod frame;
@@ -49,22 +50,30 @@ pub use crate::checksum::checksum;
 pub use device::{Device, DeviceEnd};
 pub use frame::{Decoder, FRAME_MAX, Frame, FrameError, VERSION, encode};
 pub use host::{HostEnd, HostSettings, HostStatistics, Incoming, LinkError};
+#[cfg(any(test, feature = "position"))]
+pub use message::PlaceMessage;
 pub use message::{
-    Answer, ApproachMessage, Command, Decision, Detail, Event, FaultKind, Message, ModelInfo, Outcome, Query, Refusal,
-    Statistics, TouchMessage, VerdictMessage,
+    Answer, ApproachMessage, Decision, Detail, Event, FaultKind, Message, ModelInfo, Refusal, Request, Statistics,
+    TouchMessage, VerdictMessage,
 };
 
-/// Commands that may be under way at a time, and outcomes that the chip keeps.
-pub const WINDOW: usize = 8;
+/// The most bytes of a model in one request.
+pub const CHUNK: usize = 256;
 
-/// The most bytes of a model in one message.
-pub const CHUNK: usize = 128;
+/// The most bytes of a name or of a program's name and version.
+pub const TEXT: usize = 128;
+
+/// Events that the chip keeps until the host has heard them.
+pub const EVENTS: u32 = 4;
 
 /// Bytes with a bit for each pose.
 pub const POSE_BYTES: usize = crate::MOST_POSES.div_ceil(8);
 
 /// Posteriors in one answer.
-pub(crate) const POSTERIORS: usize = CHUNK / 8;
+pub(crate) const POSTERIORS: usize = 16;
+
+/// Microseconds after which the chip repeats an event that is not heard; it doubles twice.
+pub(crate) const REPEAT: u32 = 250_000;
 
 #[cfg(test)]
 mod tests;

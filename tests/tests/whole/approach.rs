@@ -4,7 +4,7 @@ use palpate::compile::{Leaf, Restated, restate};
 use palpate_onboard::station::{NoStorage, Station, serve};
 use palpate_onboard::{Model, Proposal, Recognizer, Stopping};
 use palpate_shared::format::{Plan, Tag};
-use palpate_shared::link::{ApproachMessage, Device, POSE_BYTES, Query, Refusal};
+use palpate_shared::link::{ApproachMessage, Device, POSE_BYTES, Refusal, Request};
 use palpate_shared::{Descriptor, Poses};
 use palpate_tests::desk::{Desk, OBJECTS, Step, push};
 use palpate_tests::random::{self, Shape};
@@ -141,10 +141,10 @@ fn a_chip_proposes_over_the_link_what_the_hosts_recognizer_proposes() {
         let _ = mirror.push(touch, false);
         // Fewer and fewer poses can be reached, in the end none.
         without[number % POSE_BYTES] |= 0x1f << (number / POSE_BYTES);
-        script.push(Step::Ask(Query::NextApproach { without }));
+        script.push(Step::Ask(Request::NextApproach { without }));
         expected.push(answered(mirror.next_approach(&without)));
     }
-    script.push(Step::Ask(Query::NextApproach { without: [0xff; POSE_BYTES] }));
+    script.push(Step::Ask(Request::NextApproach { without: [0xff; POSE_BYTES] }));
     expected.push(answered(Err(Refusal::NoPlan)));
     let mut desk = Desk::new(script, 0);
     serve::<OBJECTS, _, _>(&bytes, &mut NoStorage, 0, &mut desk).unwrap();
@@ -156,7 +156,7 @@ fn a_chip_proposes_over_the_link_what_the_hosts_recognizer_proposes() {
 #[test]
 fn a_chip_without_a_plan_refuses_to_propose() {
     let bytes = model(3);
-    let mut desk = Desk::new([Step::Ask(Query::NextApproach { without: [0; POSE_BYTES] })], 0);
+    let mut desk = Desk::new([Step::Ask(Request::NextApproach { without: [0; POSE_BYTES] })], 0);
     serve::<OBJECTS, _, _>(&bytes, &mut NoStorage, 0, &mut desk).unwrap();
     assert_eq!(desk.answers, ["Refused(NoPlan)"]);
 }

@@ -14,7 +14,8 @@ use palpate::{capture, locate};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use palpate_shared::format::{Counted, Length, Trained, TrainedTouches};
 use palpate_shared::link::{
-    Decision, Decoder, Detail, Event, FaultKind, HostSettings, Message, TouchMessage, VerdictMessage,
+    Answer, Decision, Decoder, Detail, Event, FRAME_MAX, FaultKind, Frame, HostSettings, Message, Request,
+    TouchMessage, VerdictMessage, encode,
 };
 use palpate_shared::{ContactTime, Descriptor, Patterns, Touch};
 use palpate_tests::bad_line::{Faults, relay};
@@ -25,6 +26,7 @@ use palpate_tests::sections::trained;
 use palpate_tests::{HOUSEHOLD, ROOT};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
+use std::collections::BTreeSet;
 use std::io::{Read, Write};
 use std::net::TcpListener;
 use std::ops::ControlFlow;
@@ -59,7 +61,7 @@ const PATIENT: HostSettings = HostSettings { retry: 5_000_000, attempts: 10 };
 /// Settings for a line that loses something now and then.
 const BRISK: HostSettings = HostSettings { retry: 500_000, attempts: 50 };
 /// Settings for a line that loses much.
-const HASTY: HostSettings = HostSettings { retry: 50_000, attempts: 200 };
+const HASTY: HostSettings = HostSettings { retry: 10_000, attempts: 1_000 };
 
 /// A line that loses and changes bytes now and then, doubles them, and delays them by up to 2 ms.
 const BAD: Faults = Faults { lost: 0.0005, changed: 0.0005, doubled: 0.01, delay: Duration::from_millis(2) };
@@ -99,7 +101,7 @@ fn parity(
     let (transport, _emulator) = started(build("uart", target, &[], None), faults);
     let mut connection = Connection::open(transport, settings).unwrap();
     connection.load(model, &()).unwrap();
-    let chip = connection.model().unwrap();
+    let chip = connection.model().unwrap().unwrap();
     let steps = Steps::sequences(dataset(1_000), 60, touches);
     stream(&mut connection, steps, &chip, Some(model), Asks::Nothing, |connection, update| {
         each(connection, &update);
@@ -141,7 +143,7 @@ fn ten_thousand_touches_arrive_exactly_once_over_a_bad_line() {
         "{summary:?}"
     );
     assert!(summary.resent > 100 && summary.garbled > 100 && summary.chip_garbled > 100, "{summary:?}");
-    assert!(summary.chip_repeated > 10 && summary.chip_early > 10, "{summary:?}");
+    assert!(summary.chip_repeated > 100, "{summary:?}");
 }
 
 #[test]
@@ -168,7 +170,7 @@ fn touches_with_a_position_give_the_hosts_verdicts_places_and_approaches_over_a_
         let (transport, _emulator) = started(build("uart", M4F, &["--features", "locate"], None), faults);
         let mut connection = Connection::open(transport, settings).unwrap();
         connection.load(&model, &()).unwrap();
-        let chip = connection.model().unwrap();
+        let chip = connection.model().unwrap().unwrap();
         assert!(chip.info.has_maps() && chip.placements.len() == surfaces.len(), "{chip:?}");
         let (steps, asks) = (Steps::sequences(dataset.clone(), 5, touches), Asks::Place { within: None });
         let each = |_: &mut Connection, _| Ok(ControlFlow::Continue(()));
@@ -192,7 +194,7 @@ fn a_chip_that_is_reset_tells_the_host_that_evidence_and_session_are_gone() {
         let (transport, _emulator) = started(build("uart", M4F, &[], None), None);
         let mut connection = Connection::open(transport, BRISK).unwrap();
         connection.load(&model, &()).unwrap();
-        let chip = connection.model().unwrap();
+        let chip = connection.model().unwrap().unwrap();
         let mut wait = rng.random_range(1..90);
         let steps = Steps::sequences(dataset(1_000), 60, 10_000);
         let ended = stream(&mut connection, steps, &chip, Some(&model), Asks::Nothing, |connection, update| {
@@ -308,25 +310,23 @@ fn edges_and_power_cuts_that_come_at_any_instruction_become_the_hosts_verdicts()
         // counted.
         let recognizer = Recognizer::new(&model, Stopping::from_model(&model)).unwrap();
         let mut known = Known { recognizer, counted: 0 };
-        let (mut boots, mut sequences, mut heard) = (Vec::<u32>::new(), 0, 0);
+        let (mut starts, mut numbers, mut heard) = (0_usize, 0, 0);
         let image = build("gpio", target, &[], Some(file.path()));
-        run_gpio(&image, machine, segments, |boot, sequence, event| {
+        run_gpio(&image, machine, segments, |number, event| {
             if event == Event::Started {
-                assert!(!boots.contains(&boot), "{target}: boot number {boot} comes again");
-                if let Some(end) = boots.len().checked_sub(1).map(|segment| ends[segment]) {
+                if let Some(end) = starts.checked_sub(1).map(|segment| ends[segment]) {
                     heard = end;
                 }
-                boots.push(boot);
-                sequences = 0;
+                (starts, numbers) = (starts + 1, 0);
                 known.recognizer.reset();
             }
-            let place = format!("{target}, event {sequence} of start {}, touch {heard}", boots.len());
-            assert_eq!((boots.last(), sequence), (Some(&boot), sequences), "{place}");
-            sequences += 1;
+            let place = format!("{target}, event {number} of start {starts}, touch {heard}");
+            assert_eq!(number, numbers, "{place}");
+            numbers += 1;
             match event {
                 Event::Started => ControlFlow::Continue(()),
                 Event::Touch { touch, pose_age: None, verdict } => {
-                    assert!(heard < ends[boots.len() - 1], "{place}: more touches than were made");
+                    assert!(heard < ends[starts - 1], "{place}: more touches than were made");
                     assert_eq!(touch, TouchMessage::from(&touches[heard]), "{place}");
                     assert_eq!(known.push(&touches[heard]), verdict, "{place}");
                     heard += 1;
@@ -336,7 +336,7 @@ fn edges_and_power_cuts_that_come_at_any_instruction_become_the_hosts_verdicts()
                 event => panic!("{place}: {event:?}"),
             }
         });
-        assert_eq!((boots.len(), heard), (ends.len(), touches.len()));
+        assert_eq!((starts, heard), (ends.len(), touches.len()));
         let cuts = ends.len() - 1;
         let lost = touches.len() - known.counted;
         eprintln!(
@@ -348,21 +348,16 @@ fn edges_and_power_cuts_that_come_at_any_instruction_become_the_hosts_verdicts()
     }
 }
 
-/// Plays segments into the image's pins, each after the chip has started, and hands boot number, number and event of all
-/// that it says to `each`, until that has heard enough.
-fn run_gpio(
-    image: &Path,
-    machine: &str,
-    segments: Vec<Segment>,
-    mut each: impl FnMut(u32, u32, Event) -> ControlFlow<()>,
-) {
+/// Plays segments into the image's pins, each after the chip has started, and hands number and event of all that it says to `each`,
+/// until that has heard enough. No host speaks to the chip except for asking for its boot number, which is another one each time.
+fn run_gpio(image: &Path, machine: &str, segments: Vec<Segment>, mut each: impl FnMut(u32, Event) -> ControlFlow<()>) {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let mut qemu = Command::new("qemu-system-arm");
     qemu.args(["-machine", machine, "-display", "none", "-monitor", "none", "-serial", "stdio", "-serial"]);
     qemu.arg(format!("tcp:{}", listener.local_addr().unwrap())).args(["-semihosting-config", "enable=on"]);
     qemu.arg("-kernel").arg(image).stdin(Stdio::piped()).stdout(Stdio::piped());
     let mut child = qemu.spawn().unwrap();
-    let mut uart = child.stdout.take().unwrap();
+    let (mut uart, mut to_chip) = (child.stdout.take().unwrap(), child.stdin.take().unwrap());
     let (done, wait) = std::sync::mpsc::channel::<()>();
     let guard = std::thread::spawn(move || {
         // Longer than a busy machine takes; without it a lost event would keep the test waiting forever.
@@ -383,6 +378,10 @@ fn run_gpio(
         }
         pins
     });
+    // It opens no session: the chip has none of this number.
+    let request = Request::Hello { previous: 1, boot: 0 };
+    let hello = Frame { session: 2, message: Message::Request { number: 1, request } };
+    let mut boots = BTreeSet::new();
     let mut decoder = Decoder::new();
     let mut buffer = [0; 1024];
     'all: loop {
@@ -391,16 +390,26 @@ fn run_gpio(
         for &byte in &buffer[..read] {
             // A frame in which the power went does not count.
             let Some(Ok(frame)) = decoder.feed(byte) else { continue };
-            let Message::Event { boot, sequence, event } = frame.message else { continue };
-            if each(boot, sequence, event).is_break() {
+            let (number, event) = match frame.message {
+                Message::Event { number, event } => (number, event),
+                Message::Answer { answer: Answer::Session { boot, .. }, .. } => {
+                    assert!(boots.insert(boot), "boot number {boot} comes again");
+                    continue;
+                }
+                message => panic!("{message:?}"),
+            };
+            if each(number, event).is_break() {
                 break 'all;
             }
             if event == Event::Started {
+                to_chip.write_all(encode(&hello, &mut [0; FRAME_MAX])).unwrap();
+                to_chip.flush().unwrap();
                 // The player may have nothing left to play.
                 let _ = started.send(());
             }
         }
     }
+    assert!(!boots.is_empty(), "the chip says no boot number");
     drop(started);
     drop(player.join().unwrap());
     drop(done);

@@ -8,8 +8,8 @@ use palpate::compile::Leaf;
 use palpate_onboard::station::{
     FlashError, FlashStorage, Loaded, MappedFlash, NotStored, Place, Station, Storage, serve,
 };
-use palpate_shared::link::{CHUNK, Command, Device, Outcome, Query, Refusal, checksum};
-use palpate_tests::desk::{Desk, OBJECTS, PowerCut, Step, answers_to_touches, expected, load, push};
+use palpate_shared::link::{CHUNK, Device, Refusal, Request, checksum};
+use palpate_tests::desk::{Desk, OBJECTS, PowerCut, Step, expected, load, push};
 use palpate_tests::flash::{Cells, Driver, Fault, Misread, SECTOR};
 use palpate_tests::random::{self, Shape};
 use rand::rngs::ChaCha8Rng;
@@ -39,7 +39,7 @@ fn run(cells: &mut Cells, built_in: &[u8], desk: &mut Desk) -> Result<(), PowerC
 
 /// The chip's model after a start, of these.
 fn model_in<'m>(cells: &mut Cells, built_in: &[u8], models: &[&'m [u8]]) -> Option<&'m [u8]> {
-    let mut desk = Desk::new([Step::Ask(Query::Model)], 0);
+    let mut desk = Desk::new([Step::Ask(Request::Model)], 0);
     run(cells, built_in, &mut desk).unwrap();
     let is = |model: &&&[u8]| {
         let checksum = u32::from_le_bytes(*model.last_chunk().unwrap());
@@ -51,7 +51,7 @@ fn model_in<'m>(cells: &mut Cells, built_in: &[u8], models: &[&'m [u8]]) -> Opti
 /// Content of a chip's flash after a load, in words that are erased to this value.
 fn after_a_load(erased: u8) -> Vec<u8> {
     let mut cells = cells().erased_to(erased);
-    run(&mut cells, model(1), &mut Desk::new(load(model(2)), 0)).unwrap();
+    run(&mut cells, model(1), &mut Desk::new([load(model(2))], 0)).unwrap();
     assert_eq!(model_in(&mut cells, model(1), &[model(2)]), Some(model(2)));
     cells.bytes
 }
@@ -67,7 +67,7 @@ fn session(
     let what = format!("{faults:?} {misread:?}");
     let mut cells = Cells::of(held.to_vec()).erased_to(erased);
     (cells.faults, cells.misread) = (faults.to_vec(), misread);
-    let mut desk = Desk::new(load(new), 0);
+    let mut desk = Desk::new([load(new)], 0);
     let is_cut = run(&mut cells, built_in, &mut desk).is_err();
     (cells.faults, cells.misread) = (Vec::new(), None);
     let steps = [cells.steps, cells.reads.get()];
@@ -75,13 +75,13 @@ fn session(
     let is_new = found == Some(new);
     assert!(found.is_some(), "{what}: neither the old model nor the new one");
     // What the host was told is so, except that what the chip refused may be there.
-    match desk.outcomes.last() {
-        Some(Outcome::Done) if desk.is_done() => assert!(is_new, "{what}"),
-        last => assert!(is_cut || matches!(last, Some(Outcome::Refused(_))), "{what}: {last:?}"),
+    match desk.loads.last() {
+        Some(Ok(())) if desk.is_done() => assert!(is_new, "{what}"),
+        last => assert!(is_cut || matches!(last, Some(Err(_))), "{what}: {last:?}"),
     }
     // Whatever it was, the next load is as the first.
     let next = if is_new { old } else { new };
-    run(&mut cells, built_in, &mut Desk::new(load(next), 0)).unwrap();
+    run(&mut cells, built_in, &mut Desk::new([load(next)], 0)).unwrap();
     assert_eq!(model_in(&mut cells, built_in, &[next]), Some(next), "{what}");
     (is_cut, is_new, steps)
 }
@@ -147,53 +147,44 @@ fn touches_after_a_load_are_those_of_the_model_also_after_a_start() {
     let (first, second) = (model(1), model(2));
     let touches = random::touches(9, 3);
     let mut cells = cells();
-    let mut desk = Desk::new(touches.iter().map(push).chain(load(second)).chain(touches.iter().map(push)), 0);
+    let mut desk = Desk::new(touches.iter().map(push).chain([load(second)]).chain(touches.iter().map(push)), 0);
     run(&mut cells, first, &mut desk).unwrap();
-    assert_eq!(answers_to_touches(&desk), [expected(first, &touches), expected(second, &touches)].concat());
+    assert_eq!(desk.verdicts, [expected(first, &touches), expected(second, &touches)].concat());
     let mut desk = Desk::new(touches.iter().map(push), 0);
     run(&mut cells, first, &mut desk).unwrap();
-    assert_eq!(answers_to_touches(&desk), expected(second, &touches));
+    assert_eq!(desk.verdicts, expected(second, &touches));
 }
 
 #[test]
 fn a_load_whose_host_went_away_goes_on_where_it_was_for_the_same_bytes_and_no_others() {
     let (first, second) = (model(1), model(2));
-    for (bytes, continued) in [(second, &[3 * CHUNK as u32][..]), (first, &[])] {
+    for (bytes, goes_on) in [(second, 3 * CHUNK as u32), (first, 0)] {
         let mut cells = cells();
         let mut station = Station::<OBJECTS, _>::open(first, FlashStorage::new(Driver(&mut cells)).unwrap());
         // Its beginning and three chunks, then another host.
-        let mut from = Vec::new();
-        for step in load(second).into_iter().take(4).chain(load(bytes)) {
-            let said = match step {
-                Step::Do(Command::Begin { length, checksum }) => station.begin(length, checksum),
-                Step::Do(Command::Chunk { offset, .. }) if from.last().is_some_and(|from| offset < *from) => continue,
-                Step::Do(Command::Chunk { offset, bytes }) => station.chunk(offset, bytes),
-                Step::Do(Command::Commit) => station.commit(),
-                step => panic!("{step:?}"),
-            };
-            match said {
-                Outcome::Continue { offset } => from.push(offset),
-                said => assert_eq!(said, Outcome::Done),
-            }
+        let mut next = station.begin(second.len() as u32, checksum(second)).unwrap();
+        for chunk in second.chunks(CHUNK).take(3) {
+            next = station.chunk(next, chunk).unwrap();
         }
-        assert_eq!(from, continued);
+        let mut next = station.begin(bytes.len() as u32, checksum(bytes)).unwrap();
+        assert_eq!(next, goes_on);
+        for chunk in bytes[next as usize..].chunks(CHUNK) {
+            next = station.chunk(next, chunk).unwrap();
+        }
+        assert_eq!(next as usize, bytes.len());
         assert_eq!(Station::model(&station).unwrap().bytes(), bytes);
     }
 }
 
 #[test]
-fn a_flash_that_never_takes_a_chunk_is_asked_for_it_again_and_again_and_keeps_the_model_in_use() {
+fn a_flash_that_never_takes_a_chunk_asks_for_it_again_and_again_and_keeps_the_model_in_use() {
     let mut cells = cells();
     cells.endurance[LOG..].fill(0);
-    let mut desk = Desk::new(load(model(2)).into_iter().take(2), 0);
     let mut station = Station::<OBJECTS, _>::open(model(1), FlashStorage::new(Driver(&mut cells)).unwrap());
-    let mut take = || match desk.script.pop_front().unwrap() {
-        Step::Do(Command::Begin { length, checksum }) => station.begin(length, checksum),
-        Step::Do(Command::Chunk { offset, bytes }) => [0; 3].map(|_| station.chunk(offset, bytes))[2],
-        step => panic!("{step:?}"),
-    };
-    assert_eq!([take(), take()], [Outcome::Done, Outcome::Continue { offset: 0 }]);
-    assert_eq!(station.commit(), Outcome::Refused(Refusal::OutOfOrder));
+    let new = model(2);
+    assert_eq!(station.begin(new.len() as u32, checksum(new)), Ok(0));
+    assert_eq!([0; 3].map(|_| station.chunk(0, &new[..CHUNK])), [Ok(0); 3]);
+    assert_eq!(station.chunk(CHUNK as u32, &new[CHUNK..2 * CHUNK]), Err(Refusal::OutOfOrder));
     assert_eq!(Station::model(&station).unwrap().bytes(), model(1));
 }
 
@@ -201,17 +192,17 @@ fn a_flash_that_never_takes_a_chunk_is_asked_for_it_again_and_again_and_keeps_th
 fn a_load_that_cannot_be_kept_is_refused_and_the_model_from_before_stays() {
     let (first, second) = (model(1), model(2));
     let mut cells = cells();
-    run(&mut cells, first, &mut Desk::new(load(second), 0)).unwrap();
+    run(&mut cells, first, &mut Desk::new([load(second)], 0)).unwrap();
     // From here on the sectors of records are worn out, and nothing can be written into what is left of them.
     cells.endurance[..LOG].fill(0);
     cells.bytes[16..SECTOR].fill(0);
     let touch = random::touches(1, 3);
-    let script = touch.iter().map(push).chain(load(first)).chain(touch.iter().map(push));
+    let script = touch.iter().map(push).chain([load(first)]).chain(touch.iter().map(push));
     let mut desk = Desk::new(script, 0);
     run(&mut cells, first, &mut desk).unwrap();
-    assert!(desk.outcomes.contains(&Outcome::Refused(Refusal::Unwritable)), "{:?}", desk.outcomes);
+    assert_eq!(desk.loads, [Err(Refusal::Unwritable)]);
     // The touch before counts still.
-    assert_eq!(answers_to_touches(&desk), expected(second, &[touch[0], touch[0]]));
+    assert_eq!(desk.verdicts, expected(second, &[touch[0], touch[0]]));
     assert_eq!(model_in(&mut cells, first, &[first, second]), Some(second));
 }
 
@@ -256,14 +247,12 @@ fn a_check_of_ones_own_sees_a_model_before_it_is_used_and_what_is_behind_it() {
     let mut cells = cells();
     let mut outcome = |number: u8| {
         let bytes = [new, &[number]].concat().leak();
-        let mut desk = Desk::new(load(bytes), 0);
+        let mut desk = Desk::new([load(bytes)], 0);
         let mut storage = Checked(FlashStorage::new(Driver(&mut cells)).unwrap());
         serve::<OBJECTS, _, _>(built_in, &mut storage, 7, &mut desk).unwrap();
-        *desk.outcomes.last().unwrap()
+        desk.loads[0]
     };
-    assert_eq!(outcome(5), Outcome::Done);
-    assert_eq!(outcome(4), Outcome::Refused(Refusal::NotAdmitted));
-    assert_eq!(outcome(6), Outcome::Done);
+    assert_eq!([5, 4, 6].map(&mut outcome), [Ok(()), Err(Refusal::NotAdmitted), Ok(())]);
     assert_eq!(model_in(&mut cells, built_in, &[new]), Some(new));
 }
 
@@ -360,9 +349,9 @@ fn kind<const WORD: usize, const ROW: usize>(erased: u8, sector: usize) {
     let touches = random::touches(30, 3);
     for model in [second, first].repeat(40).into_iter().chain([second]) {
         let mut storage = Of::new(flash).unwrap();
-        let mut desk = Desk::new(load(model).into_iter().chain(touches.iter().map(push)), 0);
+        let mut desk = Desk::new([load(model)].into_iter().chain(touches.iter().map(push)), 0);
         serve::<OBJECTS, _, _>(first, &mut storage, 0, &mut desk).unwrap();
-        assert_eq!(answers_to_touches(&desk), expected(model, &touches), "{what}");
+        assert_eq!(desk.verdicts, expected(model, &touches), "{what}");
         flash = storage.into_flash();
     }
     assert_eq!((flash.erases, flash.erases > 1), (flash.announced, true), "{what}");

@@ -6,7 +6,8 @@ use palpate_onboard::station::{
 };
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use palpate_shared::link::{
-    Command, Decision, Decoder, Event, HostEnd, HostSettings, Incoming, Message, Outcome, Refusal, VerdictMessage,
+    Answer, Decision, Decoder, EVENTS, Event, FRAME_MAX, Frame, HostEnd, HostSettings, Incoming, Message, Refusal,
+    Request, VerdictMessage, encode,
 };
 use palpate_shared::{Pose, Touch};
 use palpate_tests::HOUSEHOLD as MODEL;
@@ -29,6 +30,9 @@ struct Bench {
     to_chip: VecDeque<u8>,
     /// Bytes that the chip has sent.
     said: Vec<u8>,
+    /// Events in them, and the number of the next one.
+    told: Vec<Event>,
+    next: u32,
     is_unplugged: bool,
     /// Every receive is an error of the line.
     is_garbled: bool,
@@ -59,8 +63,12 @@ impl Board for Bench {
     }
 
     fn send(&mut self, frame: &[u8]) -> Result<(), Unplugged> {
+        if self.is_unplugged {
+            return Err(Unplugged);
+        }
         self.said.extend(frame);
-        if self.is_unplugged { Err(Unplugged) } else { Ok(()) }
+        self.hear(frame);
+        Ok(())
     }
 
     fn pose(&mut self) -> Option<(Pose, u32)> {
@@ -91,14 +99,25 @@ impl Bench {
         self.edges.extend(edges);
     }
 
+    /// Hears an event as a host does, and says so.
+    fn hear(&mut self, frame: &[u8]) {
+        let mut decoder = Decoder::new();
+        for &byte in frame {
+            if let Some(Ok(Frame { session, message: Message::Event { number, event } })) = decoder.feed(byte) {
+                let heard = Frame { session, message: Message::Heard { number } };
+                self.to_chip.extend(encode(&heard, &mut [0; FRAME_MAX]));
+                if number >= self.next {
+                    self.next = number + 1;
+                    self.told.push(event);
+                }
+            }
+        }
+    }
+
     /// The events that the chip has told.
     fn told(&mut self) -> Vec<Event> {
-        let mut decoder = Decoder::new();
-        let event = |byte: u8| match decoder.feed(byte)?.ok()?.message {
-            Message::Event { event, .. } => Some(event),
-            _ => None,
-        };
-        std::mem::take(&mut self.said).into_iter().filter_map(event).collect()
+        self.said.clear();
+        std::mem::take(&mut self.told)
     }
 }
 
@@ -158,7 +177,7 @@ fn deciding() -> ([u32; 3], u32) {
 /// Everything that a host has sent and heard.
 struct Desk {
     host: HostEnd,
-    outcomes: Vec<Outcome>,
+    verdicts: Vec<VerdictMessage>,
     events: Vec<Event>,
 }
 
@@ -166,7 +185,7 @@ impl Desk {
     fn connected<S: Storage>(station: &mut Station<S>, bench: &mut Bench) -> Self {
         let mut host = HostEnd::new(HostSettings { retry: 1_000_000, attempts: 100 });
         host.connect(1, 0, |frame| bench.to_chip.extend(frame));
-        let mut desk = Self { host, outcomes: Vec::new(), events: Vec::new() };
+        let mut desk = Self { host, verdicts: Vec::new(), events: Vec::new() };
         desk.talk(station, bench);
         desk
     }
@@ -187,13 +206,13 @@ impl Desk {
     }
 
     fn hear(&mut self, said: &[u8], bench: &mut Bench) {
-        let Self { host, outcomes, events } = self;
+        let Self { host, verdicts, events } = self;
         host.receive(
             said,
             0,
             |frame| bench.to_chip.extend(frame),
             |incoming| match incoming {
-                Incoming::Outcome { outcome, .. } => outcomes.push(outcome),
+                Incoming::Answer(Answer::Verdict(verdict)) => verdicts.push(verdict),
                 Incoming::Event { event, .. } => events.push(event),
                 _ => {}
             },
@@ -202,7 +221,7 @@ impl Desk {
 
     fn push(&mut self, times: [u32; 3], bench: &mut Bench) {
         let touch = (&Touch::from_micros(times)).into();
-        self.host.submit(Command::Touch { touch, detail: false }, 0, |frame| bench.to_chip.extend(frame)).unwrap();
+        assert!(self.host.request(Request::Touch { touch, detail: false }, 0, |frame| bench.to_chip.extend(frame)));
     }
 }
 
@@ -215,8 +234,8 @@ fn the_first_own_touch_after_touches_from_a_host_have_decided_begins_another_obj
         desk.push(times, &mut bench);
         desk.talk(&mut station, &mut bench);
     }
-    let Some(Outcome::Verdict(VerdictMessage { decision: Decision::Recognized(_), .. })) = desk.outcomes.last() else {
-        panic!("{:?}", desk.outcomes)
+    let Some(VerdictMessage { decision: Decision::Recognized(_), .. }) = desk.verdicts.last() else {
+        panic!("{:?}", desk.verdicts)
     };
     // The touches that decided are not forgotten for one that does not count.
     let spread = Model::new(MODEL).unwrap().trained_touches().largest_spread;
@@ -254,13 +273,13 @@ fn a_link_that_fails_hides_no_touch_and_no_verdict_from_the_chips_own_program() 
     let touches = touches(&happened);
     assert_eq!((touches.len() as u32, failures), (5 * count, 5 * count * APPROACH / 1_000));
     assert_eq!(happened.iter().filter(|happened| happened.recognized().is_some()).count(), 5);
-    // Plugged in again, the next touch is told.
+    // Plugged in again, the last touches are told with the next one.
     bench.is_unplugged = false;
-    bench.told();
     bench.approach(bench.now, times.map(Some), 300_000);
     let end = bench.now + APPROACH;
     run(&mut station, &mut bench, end);
-    assert!(matches!(bench.told()[..], [Event::Touch { .. }]));
+    let told = bench.told();
+    assert!(told.len() == EVENTS as usize && told.iter().all(|event| matches!(event, Event::Touch { .. })), "{told:?}");
 }
 
 #[test]

@@ -2,14 +2,11 @@
 
 use embedded_io::{ErrorKind, ErrorType, Read, Write};
 use palpate::compile::{Leaf, Settings, compile};
-use palpate_onboard::station::{ERRORS_IN_A_ROW, Memory, NoStorage, RECORD_LENGTH, Station, serve};
+use palpate_onboard::station::{ERRORS_IN_A_ROW, Memory, NoStorage, RECORD_LENGTH, serve};
 use palpate_shared::format::{Counted, Trained, TrainedTouches};
-use palpate_shared::link::{
-    Command, DeviceEnd, FRAME_MAX, Frame, HostEnd, HostSettings, Incoming, LinkError, Message, Outcome, Query, Refusal,
-    encode,
-};
+use palpate_shared::link::{FRAME_MAX, Frame, LinkError, Message, Refusal, Request, encode};
 use palpate_shared::{ContactTime, Patterns, Pose, Touch};
-use palpate_tests::desk::{Desk, OBJECTS, PowerCut, Step, answers_to_touches, expected, load, push};
+use palpate_tests::desk::{Desk, OBJECTS, PowerCut, Step, expected, load, push};
 use palpate_tests::random::{self, Shape};
 use palpate_tests::sections::trained;
 use rand::{Rng, RngExt};
@@ -70,69 +67,65 @@ fn touches_that_the_model_was_not_trained_for_are_refused_counted_and_reported_o
         Touch::from_micros([0, 1_000_001, 9]),
         Touch::new([ContactTime::FIRST, missing, missing]),
     ];
-    let mut desk = Desk::new(touches.iter().map(push).chain([Step::Ask(Query::Statistics)]), 0);
+    let mut desk = Desk::new(touches.iter().map(push).chain([Step::Ask(Request::Counts)]), 0);
     Chip::new(bytes.clone()).run(&mut desk).unwrap();
-    assert_eq!(desk.outcomes, expected(&bytes, &touches));
-    let refusals = [Outcome::Refused(Refusal::Pattern), Outcome::Refused(Refusal::Spread)];
-    assert_eq!(desk.outcomes[1..3], refusals);
+    assert_eq!(desk.verdicts, expected(&bytes, &touches));
+    assert_eq!(desk.verdicts[1..3], [Err(Refusal::Pattern), Err(Refusal::Spread)]);
     assert!(desk.answers[0].contains("refused: 2"), "{}", desk.answers[0]);
 }
 
 #[test]
 fn without_a_model_touches_are_refused_and_nothing_else_happens() {
-    let mut desk = Desk::new([push(&touches(1)[0]), Step::Do(Command::Reset), Step::Ask(Query::Model)], 0);
+    let mut desk = Desk::new([push(&touches(1)[0]), Step::Ask(Request::Reset), Step::Ask(Request::Model)], 0);
     Chip::new(Vec::new()).run(&mut desk).unwrap();
-    assert_eq!(desk.outcomes, [Outcome::Refused(Refusal::NoModel); 2]);
-    assert_eq!(desk.answers, ["Refused(NoModel)"]);
+    assert_eq!((desk.verdicts, desk.answers), (vec![Err(Refusal::NoModel)], vec!["Refused(NoModel)".into(); 2]));
 }
 
 #[test]
-fn a_loaded_model_is_used_from_its_commit_on_and_after_a_restart() {
+fn a_loaded_model_is_used_from_its_last_part_on_and_after_a_restart() {
     let (first, second): (&[u8], &[u8]) = (model(1).leak(), model(2).leak());
     let touches = touches(40);
     let (before, after) = touches.split_at(20);
-    let mut script: Vec<Step> = load(first);
+    let mut script = vec![load(first)];
     script.extend(before.iter().map(push));
-    script.extend(load(second));
+    script.push(load(second));
     script.extend(after.iter().map(push));
     let mut chip = Chip::new(Vec::new());
     let mut desk = Desk::new(script, 0);
     chip.run(&mut desk).unwrap();
-    assert_eq!(answers_to_touches(&desk), [expected(first, before), expected(second, after)].concat());
-    let mut desk = Desk::new([Step::Ask(Query::Model), Step::Do(Command::Reset), push(&after[0])], 0);
+    assert_eq!(desk.verdicts, [expected(first, before), expected(second, after)].concat());
+    let mut desk = Desk::new([Step::Ask(Request::Model), Step::Ask(Request::Reset), push(&after[0])], 0);
     chip.run(&mut desk).unwrap();
     assert!(desk.answers[0].contains(&format!("length: {}", second.len())), "{}", desk.answers[0]);
-    assert_eq!(desk.outcomes[1], expected(second, after)[0]);
+    assert_eq!(desk.verdicts, expected(second, &after[..1]));
 }
 
 #[test]
 fn a_model_that_arrives_wrong_is_refused_and_the_old_one_stays() {
     let (good, bad): (Vec<u8>, &[u8]) = (model(1), model(2).leak());
     let touches = touches(20);
-    let wrong_checksum = Command::Begin { length: bad.len() as u32, checksum: 1 };
-    let mut script = load(bad);
-    script[0] = Step::Do(wrong_checksum);
-    // No model at all, a chunk missing, a chunk without a beginning, too long, nothing.
-    script.extend(load(&[7; 400]));
-    let mut holed = load(bad);
-    holed.remove(2);
-    script.extend(holed);
-    script.push(Step::Do(Command::Chunk { offset: 0, bytes: &[1] }));
-    script.push(Step::Do(Command::Begin { length: 30_000, checksum: 0 }));
-    script.push(Step::Do(Command::Commit));
+    let chunk = |offset, bytes| Step::Ask(Request::Chunk { offset, bytes });
+    let begin = |length, checksum| Step::Ask(Request::Begin { length, checksum });
+    // Another checksum, no model at all, no beginning, too long, nothing, a part missing, more than was announced.
+    let mut script = vec![Step::Load(bad, 1), load(&[7; 400]), chunk(0, &[1]), begin(30_000, 0), begin(0, 0)];
+    script.extend([begin(300, 0), chunk(256, &[1]), chunk(0, &[7; 256]), chunk(256, &[7; 45])]);
     script.extend(touches.iter().map(push));
     let mut desk = Desk::new(script, 0);
     Chip::new(good.clone()).run(&mut desk).unwrap();
-    let refused: Vec<Refusal> = desk
-        .outcomes
-        .iter()
-        .filter_map(|o| if let Outcome::Refused(r) = o { Some(*r).filter(|r| !r.is_of_a_touch()) } else { None })
-        .collect();
-    assert_eq!(refused[..2], [Refusal::Checksum, Refusal::Invalid]);
-    let mut rest = refused[2..].to_vec();
-    rest.dedup();
-    assert_eq!(rest, [Refusal::OutOfOrder, Refusal::TooLong, Refusal::OutOfOrder]);
-    assert!(desk.outcomes.ends_with(&expected(&good, &touches)));
+    assert_eq!(desk.loads, [Err(Refusal::Checksum), Err(Refusal::Invalid)]);
+    let refused = |refusal: Refusal| format!("Refused({refusal:?})");
+    let wanted = |offset: u32| format!("Wanted {{ offset: {offset} }}");
+    let expected_answers = [
+        refused(Refusal::OutOfOrder),
+        refused(Refusal::TooLong),
+        refused(Refusal::Invalid),
+        wanted(0),
+        refused(Refusal::OutOfOrder),
+        wanted(256),
+        refused(Refusal::TooLong),
+    ];
+    assert_eq!(desk.answers, expected_answers);
+    assert_eq!(desk.verdicts, expected(&good, &touches));
 }
 
 #[test]
@@ -141,36 +134,33 @@ fn a_chip_that_was_reset_has_its_model_and_tells_the_host_that_evidence_and_sess
     let (before, after) = touches.split_at(5);
     let (built_in, loaded): (Vec<u8>, &[u8]) = (model(1), model(2).leak());
     let mut chip = Chip::new(built_in);
-    let mut desk = Desk::new(load(loaded).into_iter().chain(before.iter().map(push)), 0);
+    let mut desk = Desk::new([load(loaded)].into_iter().chain(before.iter().map(push)), 0);
     chip.run(&mut desk).unwrap();
-    let given = desk.outcomes.len();
+    assert_eq!((desk.loads.len(), desk.verdicts.len()), (1, 5));
     // The host goes on, and nothing of its session counts.
     desk.may_fail = true;
     desk.script.extend(after.iter().map(push));
     chip.run(&mut desk).unwrap();
-    assert_eq!(desk.outcomes.len(), given);
-    let Some(LinkError::Forgotten { answered, .. }) = desk.failed else { panic!("{:?}", desk.failed) };
-    assert_eq!(answered as usize, given);
+    assert_eq!((desk.verdicts.len(), desk.failed), (5, Some(LinkError::Forgotten)));
     let mut desk = Desk::new(after.iter().map(push), 0);
     chip.run(&mut desk).unwrap();
-    assert_eq!(desk.outcomes, expected(loaded, after));
+    assert_eq!(desk.verdicts, expected(loaded, after));
 }
 
 #[test]
 fn a_chip_without_room_for_models_does_not_ask_for_a_smaller_one() {
     let mut chip = Chip::new(model(1));
     chip.models = [Vec::new(), Vec::new()];
-    let begin = Command::Begin { length: 100, checksum: 0 };
-    let mut desk = Desk::new([Step::Do(begin)], 0);
+    let mut desk = Desk::new([load(&[7; 100])], 0);
     chip.run(&mut desk).unwrap();
-    assert_eq!(desk.outcomes, [Outcome::Refused(Refusal::Unsupported)]);
+    assert_eq!(desk.loads, [Err(Refusal::Unsupported)]);
 }
 
 #[test]
 fn a_load_that_the_power_cuts_anywhere_leaves_the_old_model_or_the_new_one() {
     let (old, new): (&[u8], &[u8]) = (model(1).leak(), model(2).leak());
     let is = |chip: &mut Chip, expected: &[u8]| {
-        let mut desk = Desk::new([Step::Ask(Query::Model)], 0);
+        let mut desk = Desk::new([Step::Ask(Request::Model)], 0);
         chip.run(&mut desk).unwrap();
         let checksum = u32::from_le_bytes(*expected.last_chunk().unwrap());
         desk.answers[0].contains(&format!("checksum: {checksum},"))
@@ -178,8 +168,8 @@ fn a_load_that_the_power_cuts_anywhere_leaves_the_old_model_or_the_new_one() {
     let (mut cuts, mut olds) = (0, 0);
     for seed in 0..300 {
         let mut chip = Chip::new(Vec::new());
-        chip.run(&mut Desk::new(load(old), 0)).unwrap();
-        let mut desk = Desk::new(load(new), 30);
+        chip.run(&mut Desk::new([load(old)], 0)).unwrap();
+        let mut desk = Desk::new([load(new)], 30);
         desk.rng = rand::SeedableRng::seed_from_u64(seed);
         if chip.run(&mut desk).is_ok() {
             assert!(is(&mut chip, new));
@@ -195,7 +185,7 @@ fn a_load_that_the_power_cuts_anywhere_leaves_the_old_model_or_the_new_one() {
         olds += u32::from(is_old);
         assert!(is_old || is(&mut chip, new), "seed {seed}");
         // The load begins again.
-        chip.run(&mut Desk::new(load(new), 0)).unwrap();
+        chip.run(&mut Desk::new([load(new)], 0)).unwrap();
         assert!(is(&mut chip, new), "seed {seed}");
     }
     assert!(cuts > 50 && olds > 20, "{cuts} cuts, {olds} with the old model");
@@ -267,7 +257,7 @@ fn served(touches: &[Touch], loses: bool, errs: impl FnMut(Call) -> bool) -> [u3
     let mut uart = Uart::new(&mut desk, loses, errs);
     serve::<OBJECTS, _, _>(built_in, &mut Memory { models: [a, b], records: [c, d] }, 0, &mut uart).unwrap();
     let calls = [uart.reads, uart.writes];
-    assert_eq!(desk.outcomes, expected(&bytes, touches));
+    assert_eq!(desk.verdicts, expected(&bytes, touches));
     calls
 }
 
@@ -303,15 +293,15 @@ fn a_uart_that_only_errs_ends_the_program_which_begins_again_with_the_same_stora
     let mut uart = Uart::new(&mut desk, true, |call| matches!(call, Call::Read(number) if number >= 500));
     let ended = serve::<OBJECTS, _, _>(built_in, &mut storage, 0, &mut uart);
     assert_eq!((ended, uart.reads), (Err(GARBLED), 500 + u32::from(ERRORS_IN_A_ROW)));
-    let before = desk.outcomes.len();
+    let before = desk.verdicts.len();
     assert!((1..touches.len()).contains(&before), "{before}");
     let mut uart = Uart::new(&mut desk, true, |_| false);
     uart.desk.may_fail = true;
     assert_eq!(serve::<OBJECTS, _, _>(built_in, &mut storage, 1, &mut uart), Ok(()));
-    assert!(matches!(desk.failed, Some(LinkError::Forgotten { .. })), "{:?}", desk.failed);
+    assert!(matches!(desk.failed, Some(LinkError::Forgotten)), "{:?}", desk.failed);
     let mut desk = Desk::new(touches.iter().map(push), 0);
     assert_eq!(serve::<OBJECTS, _, _>(built_in, &mut storage, 2, &mut desk), Ok(()));
-    assert_eq!(desk.outcomes, expected(&bytes, &touches));
+    assert_eq!(desk.verdicts, expected(&bytes, &touches));
 }
 
 /// A host that asks and asks, at a UART on which nothing can be sent.
@@ -345,75 +335,11 @@ impl Write for Mute {
 
 #[test]
 fn a_uart_on_which_nothing_can_be_sent_ends_the_program_although_bytes_come() {
-    let message = Message::Query { tag: 1, query: Query::Hello };
+    let message = Message::Request { number: 1, request: Request::Hello { previous: 0, boot: 9 } };
     let frame = encode(&Frame { session: 1, message }, &mut [0; FRAME_MAX]).to_vec();
     let mut uart = Mute { frame, writes: 0 };
     let ended = serve::<OBJECTS, _, _>(&[], &mut NoStorage, 0, &mut uart);
     assert_eq!((ended, uart.writes), (Err(GARBLED), u32::from(ERRORS_IN_A_ROW)));
-}
-
-/// A wire whose read is an error before every byte, and that is ready.
-#[derive(Default)]
-struct Wire {
-    bytes: std::collections::VecDeque<u8>,
-    written: Vec<u8>,
-    is_garbled: bool,
-}
-
-impl ErrorType for Wire {
-    type Error = ErrorKind;
-}
-
-impl Read for Wire {
-    fn read(&mut self, buffer: &mut [u8]) -> Result<usize, ErrorKind> {
-        self.is_garbled = !self.is_garbled;
-        if self.is_garbled {
-            return Err(GARBLED);
-        }
-        let byte = self.bytes.pop_front();
-        byte.into_iter().zip(buffer).for_each(|(from, to)| *to = from);
-        Ok(usize::from(byte.is_some()))
-    }
-}
-
-impl embedded_io::ReadReady for Wire {
-    fn read_ready(&mut self) -> Result<bool, ErrorKind> {
-        Ok(!self.bytes.is_empty())
-    }
-}
-
-impl Write for Wire {
-    fn write(&mut self, buffer: &[u8]) -> Result<usize, ErrorKind> {
-        self.written.extend(buffer);
-        Ok(buffer.len())
-    }
-
-    fn flush(&mut self) -> Result<(), ErrorKind> {
-        Ok(())
-    }
-}
-
-#[test]
-fn both_ends_of_the_link_go_on_after_an_error_before_every_byte() {
-    let (mut host, mut end) = (HostEnd::new(HostSettings::default()), DeviceEnd::new(1));
-    let bytes = model(1);
-    let model = palpate_onboard::Model::new(&bytes).unwrap();
-    let mut station = Station::<OBJECTS>::new(&model);
-    let (mut to_chip, mut to_host) = (Wire::default(), Wire::default());
-    host.connect(1, 0, |frame| to_chip.bytes.extend(frame));
-    let (mut opened, mut errors) = (false, 0);
-    for now in 0..1_000 {
-        while !to_chip.bytes.is_empty() {
-            errors += u32::from(end.serve(&mut to_chip, &mut station).is_err());
-        }
-        to_host.bytes.extend(to_chip.written.drain(..));
-        match host.exchange(&mut to_host, now, |incoming| opened |= matches!(incoming, Incoming::Opened)) {
-            Ok(ticked) => ticked.unwrap(),
-            Err(_) => errors += 1,
-        }
-        to_chip.bytes.extend(to_host.written.drain(..));
-    }
-    assert!(opened && errors > 50, "{opened}, {errors} errors");
 }
 
 #[test]
@@ -421,12 +347,12 @@ fn a_loaded_model_of_more_objects_than_the_next_program_has_room_for_falls_back_
     let shape = Shape { thresholds: 40, leaf: 0.3, ..Shape::SMALL };
     let small = compile(&random::ensemble(shape, 1), &Settings::default()).unwrap().bytes;
     let mut chip = Chip::new(small.clone());
-    let mut desk = Desk::new(load(model(1).leak()), 0);
+    let mut desk = Desk::new([load(model(1).leak())], 0);
     chip.run(&mut desk).unwrap();
-    assert_eq!(desk.outcomes.last(), Some(&Outcome::Done));
+    assert_eq!(desk.loads, [Ok(())]);
     let touches = touches(3);
     let Chip { built_in, models: [a, b], records: [c, d], .. } = &mut chip;
     let mut desk = Desk::new(touches.iter().map(push), 0);
     serve::<4, _, _>(built_in, &mut Memory { models: [a, b], records: [c, d] }, 0, &mut desk).unwrap();
-    assert_eq!(desk.outcomes, expected(&small, &touches));
+    assert_eq!(desk.verdicts, expected(&small, &touches));
 }

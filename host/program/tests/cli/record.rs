@@ -5,7 +5,7 @@ use crate::{
 };
 use palpate::touches::Dataset;
 use palpate_shared::link::{
-    Decision, Device, DeviceEnd, Event, FaultKind, ModelInfo, Outcome, Refusal, TouchMessage, VerdictMessage,
+    Decision, Device, DeviceEnd, EVENTS, Event, FaultKind, ModelInfo, Refusal, TouchMessage, VerdictMessage,
 };
 use palpate_shared::{ContactTime, Touch};
 use serde_json::json as value;
@@ -120,36 +120,16 @@ struct Fingers {
 }
 
 impl Device for Fingers {
-    fn touch(&mut self, _: &Touch, _: bool) -> Outcome {
-        Outcome::Refused(Refusal::NoModel)
+    fn touch(&mut self, _: &Touch, _: bool) -> Result<VerdictMessage, Refusal> {
+        Err(Refusal::NoModel)
     }
 
-    fn reset(&mut self) -> Outcome {
-        Outcome::Refused(Refusal::NoModel)
-    }
-
-    fn begin(&mut self, _: u32, _: u32) -> Outcome {
-        Outcome::Refused(Refusal::Unsupported)
-    }
-
-    fn chunk(&mut self, _: u32, _: &[u8]) -> Outcome {
-        Outcome::Refused(Refusal::Unsupported)
-    }
-
-    fn commit(&mut self) -> Outcome {
-        Outcome::Refused(Refusal::Unsupported)
+    fn reset(&mut self) -> Result<(), Refusal> {
+        Err(Refusal::NoModel)
     }
 
     fn model(&self) -> Option<ModelInfo> {
         self.greeted.set(true);
-        None
-    }
-
-    fn name(&self, _: u8) -> Option<&str> {
-        None
-    }
-
-    fn posterior(&self, _: u8) -> Option<u64> {
         None
     }
 
@@ -180,21 +160,29 @@ fn miss() -> Event {
     Event::Refused { touch, refusal: Refusal::NoModel }
 }
 
-/// Answers the host until it has asked for everything, then reports these events.
+/// Answers what the host asks next, until it hangs up; says whether it has not.
+fn answer(stream: &mut TcpStream, end: &mut DeviceEnd, fingers: &mut Fingers) -> bool {
+    let mut buffer = [0; 64];
+    let count = stream.read(&mut buffer).unwrap_or(0);
+    end.receive(&buffer[..count], fingers, |frame| _ = stream.write_all(frame));
+    count > 0
+}
+
+/// Answers the host until it has asked for everything, then reports these events, each once the one before is heard.
 fn serve(stream: &mut TcpStream, end: &mut DeviceEnd, events: &[Event]) {
     let mut fingers = Fingers { greeted: Cell::new(false) };
-    let mut buffer = [0; 64];
     while !fingers.greeted.get() {
-        let count = stream.read(&mut buffer).unwrap();
-        assert!(count > 0, "the host hung up");
-        end.receive(&buffer[..count], &mut fingers, |frame| stream.write_all(frame).unwrap());
+        assert!(answer(stream, end, &mut fingers), "the host hung up");
     }
-    events.iter().for_each(|event| end.tell(*event, |frame| stream.write_all(frame).unwrap()));
+    for event in events {
+        end.tell(*event, |frame| _ = stream.write_all(frame));
+        while end.wait(0).is_some() && answer(stream, end, &mut fingers) {}
+    }
 }
 
 /// Until the host hangs up.
 fn wait(stream: &mut TcpStream) {
-    while !matches!(stream.read(&mut [0; 64]), Ok(0)) {}
+    while !matches!(stream.read(&mut [0; 64]), Ok(0) | Err(_)) {}
 }
 
 /// Records touches of a bowl by a chip: its port, what the program says on stderr, and its output.
@@ -215,7 +203,7 @@ fn chip(events: Vec<Event>) -> impl FnOnce(&TcpListener) + Send + 'static {
 }
 
 #[test]
-fn a_pulled_cable_neither_loses_a_reported_touch_nor_doubles_one() {
+fn a_pulled_cable_neither_loses_a_touch_that_the_chip_keeps_nor_doubles_one() {
     let at = &Folder::new();
     let chip = |listener: &TcpListener| {
         let mut end = DeviceEnd::new(5);
@@ -225,20 +213,20 @@ fn a_pulled_cable_neither_loses_a_reported_touch_nor_doubles_one() {
         // In the middle of a frame.
         end.tell(event(6), |frame| stream.write_all(&frame[..frame.len() / 2]).unwrap());
         drop(stream);
-        // Nobody hears this one.
-        end.tell(event(7), |_| ());
+        // Nobody hears these: the chip keeps the last of them.
+        (7..=7 + EVENTS).for_each(|number| end.tell(event(number), |_| ()));
         let (mut stream, _) = listener.accept().unwrap();
         let fault = Event::Fault { kind: FaultKind::Silent, finger: 2 };
-        serve(&mut stream, &mut end, &[event(8), fault, miss(), event(9), event(10)]);
+        serve(&mut stream, &mut end, &[fault, miss(), event(12), event(13)]);
         wait(&mut stream);
     };
-    let (port, said, output) = record_chip(at, chip, "--stop-after 8 --json");
-    // The tenth was told, but eight were wanted.
-    let mut expected: Vec<Touch> = (1..=5).chain(8..=9).map(touch).collect();
-    expected.insert(6, Touch::new([ContactTime::MISSING; 3]));
+    let (port, said, output) = record_chip(at, chip, "--stop-after 11 --json");
+    // The thirteenth was told, but eleven were wanted.
+    let mut expected: Vec<Touch> = (1..=5).chain(8..=12).map(touch).collect();
+    expected.insert(9, Touch::new([ContactTime::MISSING; 3]));
     assert_eq!(Dataset::read_any(&at.join("recorded")).unwrap().objects[0].touches(), expected);
     let expected = value!({
-        "object": "bowl", "touches": 8, "all_touches": 8, "contacts": [1, 0, 3, 4], "without_pose": 0, "missed": 2,
+        "object": "bowl", "touches": 11, "all_touches": 11, "contacts": [1, 0, 5, 5], "without_pose": 0, "missed": 2,
         "faults": 1, "lost": 1, "firmware": "three fingers 1.0",
     });
     assert_eq!(json(output), expected);
@@ -247,7 +235,7 @@ fn a_pulled_cable_neither_loses_a_reported_touch_nor_doubles_one() {
     let stated = read(&at.join("recorded/dataset.json"));
     assert_eq!(stated["recorded"].as_array().unwrap().len(), 1, "{stated}");
     assert_eq!(stated["recorded"][0]["firmware"], "three fingers 1.0");
-    assert_eq!((&stated["recorded"][0]["source"], &stated["objects"][0]["touches"]), (&value!(port), &value!(8)));
+    assert_eq!((&stated["recorded"][0]["source"], &stated["objects"][0]["touches"]), (&value!(port), &value!(11)));
 }
 
 #[test]

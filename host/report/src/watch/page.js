@@ -63,7 +63,7 @@
       undecided: `Undecided ${after}: perhaps ${name(last.object)}.`,
       recognized: `Recognized: ${name(last.object)}, ${after}.`,
       unknown: `No object that the model knows, ${after}.`,
-      "gave up": `Gave up ${after}.`,
+      "gave-up": `Gave up ${after}.`,
     }[verdict];
     element("verdict").dataset.verdict = verdict;
     bars.forEach(({ row }, index) => row.classList.toggle("named", verdict === "recognized" && index === last?.object));
@@ -136,19 +136,17 @@
     },
     posteriors: ({ of }) => showPosteriors(of),
     touch: (touch) => {
-      const { times, verdict, object, touches, earlier } = touch;
-      const says = { undecided: `perhaps ${name(object)}`, unknown: "no object it knows", "gave up": "gave up" }[verdict]
+      const { times, verdict, object, touches } = touch;
+      const says = { undecided: `perhaps ${name(object)}`, unknown: "no object it knows", "gave-up": "gave up" }[verdict]
         ?? `recognized ${name(object)} after ${counted(touches, "touch", "touches")}`;
-      enter(count += 1, times.map(milliseconds), earlier ? `${says} (told again: before the chip was started)` : says,
-        verdict === "undecided" ? "" : "done");
-      if (earlier) return;
+      enter(count += 1, times.map(milliseconds), says, verdict === "undecided" ? "" : "done");
       last = touch;
       draw(times);
       showVerdict();
     },
-    refused: ({ times, why, earlier }) => {
-      enter(count += 1, times.map(milliseconds), `not counted: ${why}${earlier ? " (before the chip was started)" : ""}`);
-      if (!earlier) draw(times);
+    refused: ({ times, why }) => {
+      enter(count += 1, times.map(milliseconds), `not counted: ${why}`);
+      draw(times);
     },
     fault: ({ finger, what }) => enter("", dashes, `fault: ${finger === null ? "" : `${FINGERS[finger]}: `}${what}`, "fault"),
     started: () => {

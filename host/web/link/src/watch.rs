@@ -2,13 +2,10 @@
 
 use palpate_shared::Touch;
 use palpate_shared::link::{
-    Answer, Command, Decision, Decoder, Event, FrameError, HostEnd, HostSettings, Incoming, LinkError, ModelInfo,
-    Outcome, Query, Refusal, TouchMessage, VerdictMessage,
+    Answer, Decision, Decoder, Event, FrameError, HostEnd, HostSettings, Incoming, LinkError, ModelInfo, Refusal,
+    Request, TouchMessage, VERSION, VerdictMessage,
 };
 use serde::Serialize;
-
-/// Microseconds after which a chip whose program does not know the question for its name is asked no longer.
-const PROGRAM_WAIT: u64 = 5_000_000;
 
 /// From the number of a session that ended to the next; odd, so that none comes again soon.
 const SESSION_STEP: u32 = 0x9e37_79b9;
@@ -34,10 +31,10 @@ pub(crate) enum Happening {
     NoModel { why: String },
     /// The posterior of each object.
     Posteriors { of: Vec<f64> },
-    /// The chip's fingers touched. `earlier`: in a start of the chip before the current one.
-    Touch { times: Times, verdict: &'static str, object: u8, touches: u32, earlier: bool },
+    /// The chip's fingers touched.
+    Touch { times: Times, verdict: &'static str, object: u8, touches: u32 },
     /// The chip's fingers touched, and that was not counted.
-    Refused { times: Times, why: String, earlier: bool },
+    Refused { times: Times, why: String },
     /// A finger is faulty: 0, 1 or 2; none if it is not the fault of one finger.
     Fault { finger: Option<u8>, what: String },
     /// The chip was started.
@@ -48,28 +45,29 @@ pub(crate) enum Happening {
     Missed { count: u32 },
 }
 
-/// Knowledge about a chip, asked for one question after the other.
+/// Knowledge about a chip, asked for one request after the other.
 #[derive(Debug, Default)]
 struct Known {
     /// None while it is not known; none inside if the chip has none.
     model: Option<Option<ModelInfo>>,
     names: Vec<String>,
+    has_program: bool,
     posteriors: Vec<f64>,
     /// True once the posteriors are those after the last touch.
     is_current: bool,
-    has_program: bool,
 }
 
 impl Known {
-    fn next(&self) -> Option<Query> {
+    fn next(&self) -> Option<Request<'static>> {
         let object = |count: usize| u8::try_from(count).unwrap_or(u8::MAX);
         match self.model {
-            None => Some(Query::Model),
+            None => Some(Request::Model),
             Some(Some(info)) if self.names.len() < info.objects() => {
-                Some(Query::Name { object: object(self.names.len()) })
+                Some(Request::Name { object: object(self.names.len()) })
             }
-            Some(Some(_)) if !self.is_current => Some(Query::Posteriors { first: object(self.posteriors.len()) }),
-            _ => (!self.has_program).then_some(Query::Program),
+            _ if !self.has_program => Some(Request::Program),
+            Some(Some(_)) if !self.is_current => Some(Request::Posteriors { first: object(self.posteriors.len()) }),
+            _ => None,
         }
     }
 
@@ -78,11 +76,11 @@ impl Known {
         self.is_current = false;
     }
 
-    /// Takes the answer to a question.
-    fn take(&mut self, query: Query, answer: Answer<'_>, happened: &mut Vec<Happening>) {
-        match (query, answer) {
-            (Query::Model, Answer::Model(info)) => self.model = Some(Some(info)),
-            (Query::Model, answer) => {
+    /// Takes the answer to a request.
+    fn take(&mut self, request: &Request<'_>, answer: Answer<'_>, happened: &mut Vec<Happening>) {
+        match (request, answer) {
+            (Request::Model, Answer::Model(info)) => self.model = Some(Some(info)),
+            (Request::Model, answer) => {
                 self.model = Some(None);
                 let why = match answer {
                     Answer::Refused(refusal) => refusal.to_string(),
@@ -90,7 +88,7 @@ impl Known {
                 };
                 happened.push(Happening::NoModel { why });
             }
-            (Query::Name { object }, answer) => {
+            (Request::Name { object }, answer) => {
                 self.names.push(match answer {
                     Answer::Name(name) => name.into(),
                     _ => format!("object {object}"),
@@ -102,9 +100,9 @@ impl Known {
                     happened.push(Happening::Model { checksum, length, objects: self.names.clone() });
                 }
             }
-            (Query::Posteriors { first }, Answer::Posteriors(bytes)) => {
+            (Request::Posteriors { first }, Answer::Posteriors(bytes)) => {
                 // Parts that do not follow one another belong to different touches: ask again from the first.
-                if usize::from(first) != self.posteriors.len() {
+                if usize::from(*first) != self.posteriors.len() {
                     return;
                 }
                 let probability = |q56: &[u8; 8]| u64::from_le_bytes(*q56) as f64 / 2.0_f64.powi(56);
@@ -114,12 +112,19 @@ impl Known {
                     happened.push(Happening::Posteriors { of: self.posteriors.clone() });
                 }
             }
-            (Query::Posteriors { .. }, _) => self.is_current = true,
-            (Query::Program, answer) => {
+            (Request::Posteriors { .. }, _) => self.is_current = true,
+            (Request::Program, answer) => {
                 self.has_program = true;
-                if let Answer::Program(name) = answer {
+                if let Answer::Name(name) = answer {
                     happened.push(Happening::Program { name: name.into() });
                 }
+            }
+            (Request::Reset, Answer::Refused(refusal)) => {
+                happened.push(Happening::Fault { finger: None, what: refusal.to_string() });
+            }
+            (Request::Reset, _) => {
+                self.touched();
+                happened.push(Happening::Reset);
             }
             _ => {}
         }
@@ -133,11 +138,13 @@ pub(crate) struct Watch {
     /// Reads the same bytes: the end counts frames of another version and does not say which.
     versions: Decoder,
     session: u32,
-    /// The chip's boot number, if it is known.
-    boot: Option<u32>,
     known: Known,
-    /// The question that is open, and since when.
-    asked: Option<(Query, u64)>,
+    /// The request under way.
+    asked: Option<Request<'static>>,
+    /// True if the chip is to forget its touches.
+    resets: bool,
+    /// True if the chip may have been reset: an answer to anything shows whether it was.
+    is_doubtful: bool,
     happened: Vec<Happening>,
 }
 
@@ -147,9 +154,10 @@ impl Default for Watch {
             end: HostEnd::new(HostSettings::default()),
             versions: Decoder::new(),
             session: 0,
-            boot: None,
             known: Known::default(),
             asked: None,
+            resets: false,
+            is_doubtful: false,
             happened: Vec::new(),
         }
     }
@@ -167,87 +175,76 @@ impl Watch {
 
     pub(crate) fn connect(&mut self, session: u32, now: u64, line: &mut Vec<u8>) {
         (self.session, self.asked, self.known) = (session, None, Known::default());
+        (self.resets, self.is_doubtful) = (false, false);
         self.end.connect(session, now, |bytes| line.extend(bytes));
     }
 
     pub(crate) fn receive(&mut self, bytes: &[u8], now: u64, line: &mut Vec<u8>) {
         for byte in bytes {
             if let Some(Err(FrameError::Version(theirs))) = self.versions.feed(*byte) {
-                self.happened.push(Happening::Version { theirs, ours: palpate_shared::link::VERSION });
+                self.happened.push(Happening::Version { theirs, ours: VERSION });
             }
-            // One at a time: what an answer says decides on the next question.
-            let mut opened = false;
-            let Self { end, boot, known, asked, happened, .. } = self;
+            // One at a time: what an answer says decides on the next request.
+            let Self { end, known, asked, is_doubtful, happened, .. } = self;
             end.receive(
                 &[*byte],
                 now,
                 |bytes| line.extend(bytes),
                 |incoming| match incoming {
-                    Incoming::Opened => opened = true,
+                    Incoming::Opened => happened.push(Happening::Connected),
                     Incoming::Answer(answer) => {
-                        if let Some((query, _)) = asked.take() {
-                            known.take(query, answer, happened);
+                        if let Some(request) = asked.take() {
+                            known.take(&request, answer, happened);
                         }
                     }
-                    Incoming::Event { event, missed, boot: of } => {
+                    Incoming::Event { event, missed } => {
                         if missed > 0 {
                             happened.push(Happening::Missed { count: missed });
                         }
-                        if event == Event::Started {
+                        match event {
                             // Perhaps with another program or model.
-                            (*boot, *known) = (Some(of), Known::default());
+                            Event::Started => *known = Known::default(),
+                            Event::Touch { .. } | Event::Refused { .. } => known.touched(),
+                            _ => {}
                         }
-                        let is_earlier = boot.is_some_and(|boot| boot != of);
-                        if matches!(event, Event::Touch { .. } | Event::Refused { .. }) && !is_earlier {
-                            known.touched();
-                        }
-                        happened.push(told(&event, is_earlier));
+                        happened.push(told(&event));
                     }
-                    Incoming::Outcome { outcome: Outcome::Refused(refusal), .. } => {
-                        happened.push(Happening::Fault { finger: None, what: refusal.to_string() });
-                    }
-                    Incoming::Outcome { .. } => {
-                        known.touched();
-                        happened.push(Happening::Reset);
-                    }
+                    Incoming::Stranger => *is_doubtful = true,
                 },
             );
-            if opened {
-                (self.boot, self.asked, self.known) = (Some(self.end.boot()), None, Known::default());
-                self.happened.push(Happening::Connected);
-            }
-            self.ask(now, line);
+            self.proceed(now, line);
         }
     }
 
-    fn ask(&mut self, now: u64, line: &mut Vec<u8>) {
-        if self.asked.is_none()
-            && let Some(query) = self.known.next()
-            && self.end.ask(query, now, |bytes| line.extend(bytes))
-        {
-            self.asked = Some((query, now));
-        }
-    }
-
-    pub(crate) fn tick(&mut self, now: u64, line: &mut Vec<u8>) {
-        if let Some((Query::Program, since)) = self.asked
-            && now.saturating_sub(since) > PROGRAM_WAIT
-        {
-            self.end.withdraw();
-            (self.asked, self.known.has_program) = (None, true);
-        }
+    /// Begins another session where the one before has ended, and asks what there is to ask.
+    fn proceed(&mut self, now: u64, line: &mut Vec<u8>) {
         if let Err(error) = self.end.tick(now, |bytes| line.extend(bytes)) {
-            if matches!(error, LinkError::Silent { .. }) {
+            if error == LinkError::Silent {
                 self.happened.push(Happening::Silent);
             }
             self.connect(self.session.wrapping_add(SESSION_STEP), now, line);
         }
-        self.ask(now, line);
+        if !self.end.is_idle() {
+            return;
+        }
+        let request = match self.resets {
+            true => Some(Request::Reset),
+            false => self.known.next().or_else(|| self.is_doubtful.then_some(Request::Counts)),
+        };
+        if let Some(request) = request {
+            (self.resets, self.is_doubtful) = (false, false);
+            self.end.request(request.clone(), now, |bytes| line.extend(bytes));
+            self.asked = Some(request);
+        }
+    }
+
+    pub(crate) fn tick(&mut self, now: u64, line: &mut Vec<u8>) {
+        self.proceed(now, line);
     }
 
     pub(crate) fn reset(&mut self, now: u64, line: &mut Vec<u8>) {
-        // A window that is full already holds resets.
-        self.end.submit(Command::Reset, now, |bytes| line.extend(bytes));
+        self.resets = true;
+        self.proceed(now, line);
     }
 }
 
@@ -255,16 +252,11 @@ fn times(touch: &TouchMessage) -> Times {
     Touch::from(touch).times().map(|time| time.micros())
 }
 
-fn told(event: &Event, earlier: bool) -> Happening {
+fn told(event: &Event) -> Happening {
     match event {
         Event::Touch { touch, verdict: VerdictMessage { decision, best, touches, .. }, .. } => {
-            let (verdict, object) = match *decision {
-                Decision::Recognized(object) => ("recognized", object),
-                Decision::Unknown => ("unknown", *best),
-                Decision::GaveUp => ("gave up", *best),
-                _ => ("undecided", *best),
-            };
-            Happening::Touch { times: times(touch), verdict, object, touches: *touches, earlier }
+            let object = if let Decision::Recognized(object) = decision { object } else { best };
+            Happening::Touch { times: times(touch), verdict: decision.name(), object: *object, touches: *touches }
         }
         Event::Refused { touch, refusal } => {
             let times = times(touch);
@@ -274,7 +266,7 @@ fn told(event: &Event, earlier: bool) -> Happening {
                 }
                 refusal => refusal.to_string(),
             };
-            Happening::Refused { times, why, earlier }
+            Happening::Refused { times, why }
         }
         Event::Fault { kind, finger } => {
             Happening::Fault { finger: (*finger < 3).then_some(*finger), what: kind.to_string() }

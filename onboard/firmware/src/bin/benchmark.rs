@@ -12,7 +12,7 @@ use palpate_onboard::effector::{Edge, Effector, Finger, Geometry, Scale, Setting
 use palpate_onboard::station::{NoStorage, Station, serve};
 use palpate_onboard::{Model, Recognizer, Stopping};
 use palpate_shared::link::{
-    Command, Decoder, Detail, Device, DeviceEnd, FRAME_MAX, Frame, Message, TouchMessage, encode,
+    Decoder, Detail, Device, DeviceEnd, FRAME_MAX, Frame, Message, Request, TouchMessage, encode,
 };
 use palpate_shared::{Descriptor, Pose, Touch};
 
@@ -76,9 +76,9 @@ fn effector(meter: &mut Meter, touch: &Touch) {
     cost!(meter, "effector: another spacing and speed", || scale.apply(black_box(touch)));
 }
 
-fn touch_frame<'o>(touch: &Touch, sequence: u32, detail: bool, out: &'o mut [u8; FRAME_MAX]) -> &'o [u8] {
-    let command = Command::Touch { touch: TouchMessage::from(touch), detail };
-    encode(&Frame { session: 0, message: Message::Command { sequence, command } }, out)
+fn touch_frame<'o>(touch: &Touch, number: u32, detail: bool, out: &'o mut [u8; FRAME_MAX]) -> &'o [u8] {
+    let request = Request::Touch { touch: TouchMessage::from(touch), detail };
+    encode(&Frame { session: 0, message: Message::Request { number, request } }, out)
 }
 
 fn link(meter: &mut Meter, touch: &Touch) {
@@ -86,7 +86,7 @@ fn link(meter: &mut Meter, touch: &Touch) {
     let bytes = touch_frame(touch, 1_000, true, &mut out);
     let bare = Touch::new(touch.times());
     for (name, touch) in [("with a pose", touch), ("without", &bare)] {
-        // Ten bits per byte; the outcome's frame, 18 bytes without detail, travels at the same time.
+        // Ten bits per byte; the answer's frame, 18 bytes without detail, comes after it.
         let length = touch_frame(touch, 1_000, true, &mut [0; FRAME_MAX]).len();
         println!("a touch's frame {}: {} bytes, {} touches per second at 115,200 baud", name, length, 11_520 / length);
     }
@@ -117,12 +117,12 @@ fn recognizer(meter: &mut Meter, model: &Model<'_>, touch: &Touch) {
     cost!(meter, "station: detail for parity", || Detail::new(black_box(5), black_box(&evidence)));
     cost!(meter, "station: a touch", || station.touch(black_box(touch), false));
     let mut end = DeviceEnd::new(0);
-    let mut sequence = 0;
+    let mut number = 0;
     for (name, detail) in [("without detail", false), ("with detail", true)] {
         let mut by_link = || {
             let mut out = [0; FRAME_MAX];
-            let bytes = touch_frame(touch, sequence, detail, &mut out);
-            sequence += 1;
+            number += 1;
+            let bytes = touch_frame(touch, number, detail, &mut out);
             let mut sent = 0;
             end.receive(bytes, &mut station, |frame| sent += frame.len());
             sent
@@ -130,7 +130,7 @@ fn recognizer(meter: &mut Meter, model: &Model<'_>, touch: &Touch) {
         let sent = by_link();
         let instructions = meter.measure(&mut by_link);
         println!("{:44} {:8} {:6}", "link: a touch, there and back", instructions, meter::stack(&mut by_link));
-        println!("  {}: an outcome of {} bytes", name, sent);
+        println!("  {}: an answer of {} bytes", name, sent);
     }
     whole(meter, touch);
 }
@@ -138,9 +138,9 @@ fn recognizer(meter: &mut Meter, model: &Model<'_>, touch: &Touch) {
 /// The whole program.
 fn whole(meter: &mut Meter, touch: &Touch) {
     let run = |touches: u32| {
-        let mut wire = Wire { touch, touches, sequence: 0, frame: [0; FRAME_MAX], at: 0, length: 0 };
+        let mut wire = Wire { touch, touches, number: 0, frame: [0; FRAME_MAX], at: 0, length: 0 };
         match serve::<OBJECTS, _, _>(MODEL, &mut NoStorage, 0, &mut wire) {
-            Ok(()) => wire.sequence,
+            Ok(()) => wire.number,
             Err(_) => fail(),
         }
     };
@@ -154,7 +154,7 @@ fn whole(meter: &mut Meter, touch: &Touch) {
     struct Wire<'t> {
         touch: &'t Touch,
         touches: u32,
-        sequence: u32,
+        number: u32,
         frame: [u8; FRAME_MAX],
         at: usize,
         length: usize,
@@ -167,12 +167,12 @@ fn whole(meter: &mut Meter, touch: &Touch) {
     impl embedded_io::Read for Wire<'_> {
         fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Self::Error> {
             if self.at == self.length {
-                if self.sequence == self.touches {
+                if self.number == self.touches {
                     return Ok(0);
                 }
-                self.length = touch_frame(self.touch, self.sequence, true, &mut self.frame).len();
+                self.number += 1;
+                self.length = touch_frame(self.touch, self.number, true, &mut self.frame).len();
                 self.at = 0;
-                self.sequence += 1;
             }
             let rest = self.frame.get(self.at..self.length).unwrap_or_default();
             let count = rest.len().min(buffer.len());

@@ -5,7 +5,7 @@
 
 use core::hint::black_box;
 use cortex_m_rt::entry;
-use palpate_onboard::shared::link::{Decision, Device, DeviceEnd, ModelInfo, Outcome, Refusal, VerdictMessage};
+use palpate_onboard::shared::link::{Decision, Device, DeviceEnd, Refusal, VerdictMessage};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 use palpate_shared::Touch;
 
@@ -16,36 +16,20 @@ mod no_panic;
 struct Chip<'m>(Recognizer<'m, 10>);
 
 impl Device for Chip<'_> {
-    fn touch(&mut self, touch: &Touch, _: bool) -> Outcome {
+    fn touch(&mut self, touch: &Touch, _: bool) -> Result<VerdictMessage, Refusal> {
         let decision = match self.0.push(touch) {
             Ok(Verdict::Undecided) => Decision::Undecided,
             Ok(Verdict::Recognized { object, .. }) => Decision::Recognized(object),
             Ok(Verdict::Unknown) => Decision::Unknown,
             Ok(Verdict::GaveUp) => Decision::GaveUp,
-            Err(_) => return Outcome::Refused(Refusal::Pattern),
+            Err(_) => return Err(Refusal::Pattern),
         };
-        Outcome::Verdict(VerdictMessage { decision, best: 0, touches: self.0.touches(), detail: None })
+        Ok(VerdictMessage { decision, best: 0, touches: self.0.touches(), detail: None })
     }
 
-    fn reset(&mut self) -> Outcome {
+    fn reset(&mut self) -> Result<(), Refusal> {
         self.0.reset();
-        Outcome::Done
-    }
-
-    fn begin(&mut self, _: u32, _: u32) -> Outcome {
-        Outcome::Refused(Refusal::Unsupported)
-    }
-
-    fn chunk(&mut self, _: u32, _: &[u8]) -> Outcome {
-        Outcome::Refused(Refusal::Unsupported)
-    }
-
-    fn commit(&mut self) -> Outcome {
-        Outcome::Refused(Refusal::Unsupported)
-    }
-
-    fn model(&self) -> Option<ModelInfo> {
-        None
+        Ok(())
     }
 
     fn name(&self, object: u8) -> Option<&str> {

@@ -7,11 +7,11 @@ use crate::commands::recognize_lines::Line;
 use crate::commands::recognize_maps::print_located;
 use crate::commands::{self, Global};
 use palpate::chip::{
-    Asks, ChipModel, Connection, Emulator, Entry, Located, Port, Received, Steps, Summary, Transport, Update,
+    Asks, ChipModel, Connection, Emulator, Entry, Located, Port, Steps, Summary, Transport, Update, no_rows,
     probability, stream,
 };
 use palpate::compile::CompiledModel;
-use palpate::error::{ChipProblem, Place};
+use palpate::error::{Place, problem};
 use palpate::locate::{self, MapsFile};
 use palpate::output::{print, print_json};
 use palpate::progress::Progress;
@@ -138,7 +138,7 @@ fn model_of_touches(path: &Path) -> Result<Vec<u8>> {
     let compiled = CompiledModel::read(path)?;
     match compiled.model().descriptor() {
         Some(_) => Ok(compiled.bytes().to_vec()),
-        None => Err(Error::variant_at(Place::file(path), ChipProblem::Rows)),
+        None => Err(no_rows().at(Place::file(path))),
     }
 }
 
@@ -148,9 +148,9 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         None => None,
     };
     let (mut connection, model) = arguments.open()?;
-    let chip = connection.model()?;
+    let chip = connection.must_have_model()?;
     if steps.is_some() && chip.info.descriptor().is_none() && !chip.info.has_maps() {
-        return Err(ChipProblem::Rows.into());
+        return Err(no_rows());
     }
     let mut printer = Printer::new(&chip, global.json);
     let Some(steps) = steps else {
@@ -177,7 +177,8 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     match summary.first_difference {
         Some(first) if arguments.parity.is_some() => {
             let Summary { differences, compared, .. } = summary;
-            Err(ChipProblem::Differs { differences, compared, first }.into())
+            Err(problem!("{differences} of {compared} touches differ; the first: {first}")
+                .fix("Report this as a bug, with the model and the touches."))
         }
         _ => Ok(()),
     }
@@ -193,10 +194,16 @@ fn own_fingers(connection: &mut Connection, chip: &ChipModel, arguments: &Argume
     say(&Entry::model(chip))?;
     let (start, mut touches) = (Instant::now(), 0);
     while arguments.stop_after != Some(touches) {
-        let (event, missed) = match connection.hear(Duration::from_millis(50))? {
-            Some(Received::Event(event, missed)) => (event, missed),
-            _ => continue,
-        };
+        let Some((event, missed)) = connection.hear(Duration::from_millis(50))? else { continue };
+        // A model that was loaded and cannot be read any more is replaced by the program's own.
+        if event == Event::Started && connection.model()?.as_ref() != Some(chip) {
+            return Err(problem!("the chip was reset and has another model than before")
+                .fix(
+                    "Load the model again. The chip's flash may be worn, or its program may have been replaced by one \
+                     without the model's features.",
+                )
+                .at(Place::file(arguments.port.to_string())));
+        }
         if missed > 0 {
             commands::remark(&format!("palpate: warning: {missed} reports of the chip were lost on the way"));
         }
@@ -206,7 +213,8 @@ fn own_fingers(connection: &mut Connection, chip: &ChipModel, arguments: &Argume
         if matches!(event, Event::Touch { .. } | Event::Refused { .. }) {
             touches += 1;
             if asks {
-                say(&Entry::next(&connection.next_approach()?))?;
+                let approach = connection.next_approach()?.map_err(|refusal| connection.refused(refusal))?;
+                say(&Entry::next(&approach))?;
             }
         }
     }
@@ -258,23 +266,18 @@ impl<'c> Printer<'c> {
             Update::Object(name) => (self.object, self.last) = (name.clone(), None),
             Update::Touch { verdict, .. } if self.prints_places => (self.last, self.refused) = (Some(*verdict), None),
             Update::Refused { refusal, .. } if self.prints_places => self.refused = Some(*refusal),
-            Update::Located(Located { table_alone, poses, next }) => {
+            Update::Located(Located { table_alone, exhausted, poses, next }) => {
                 let decision = self.last.map_or(Decision::Undecided, |last| last.decision);
                 let posterior =
                     self.last.and_then(|last| last.detail).map_or(0.0, |detail| probability(detail.posterior()));
                 let line = Line {
                     touch: self.last.map_or(0, |last| last.touches),
-                    verdict: match decision {
-                        Decision::Recognized(_) => "recognized",
-                        Decision::Unknown => "unknown",
-                        Decision::GaveUp => "gave-up",
-                        _ => "undecided",
-                    },
+                    verdict: decision.name(),
                     object: self.last.map_or("", |last| self.name(last.best)),
                     posterior,
                     refused: self.refused.map(|refusal| refusal.to_string()),
                     table_alone: matches!(decision, Decision::Unknown | Decision::GaveUp) && *table_alone,
-                    exhausted: false,
+                    exhausted: *exhausted,
                     next: None,
                 };
                 let name = |placement: u8| self.chip.placements.get(usize::from(placement)).map_or("", String::as_str);
@@ -331,13 +334,13 @@ impl<'c> Printer<'c> {
             text += &format!("compared with the host: {compared} touches{approaches}, {differences} differences\n");
         }
         text += &format!(
-            "link: {} frames sent, {} again; {} garbled here, {} on the chip; {} commands came twice, {} too early\n",
+            "link: {} requests sent, {} again; {} frames garbled here, {} on the chip; {} requests came twice, {} too late\n",
             summary.sent,
             summary.resent,
             summary.garbled,
             summary.chip_garbled,
             summary.chip_repeated,
-            summary.chip_early
+            summary.chip_late
         );
         print(&text)
     }

@@ -66,7 +66,7 @@ fn UART0_IRQ() {
                 Err(nb::Error::WouldBlock) => break,
             };
             for byte in bytes {
-                // No host that keeps to the window sends more.
+                // No host that waits for answers sends more.
                 let _ = received.push_back(*byte);
             }
         }

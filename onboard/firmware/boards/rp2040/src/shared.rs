@@ -26,7 +26,7 @@ pub(crate) type Wires = (Pin<Gpio0, FunctionUart, PullDown>, Pin<Gpio1, Function
 /// The UART on them.
 pub(crate) type Uart = UartPeripheral<Enabled, UART0, Wires>;
 
-/// Bytes that may wait for the main loop: everything that a host sends without an answer, 8 commands and a question.
+/// Bytes that may wait for the main loop: more than a host sends without an answer, the longest request and its repetitions.
 pub(crate) const WAITING: usize = 2048;
 
 /// The chip's microsecond timer.
