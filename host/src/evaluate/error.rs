@@ -38,22 +38,6 @@ pub enum EvaluateProblem {
         /// The object.
         object: String,
     },
-    /// An object has too few touches to say what its touches give.
-    #[error("an object has only {found} touches to learn the expected evidence from, or they are all alike")]
-    TooFewForMisfit {
-        /// Number of touches.
-        found: usize,
-    },
-    /// There are too few sequences to promise a share of false alarms, or too many false alarms at every threshold.
-    #[error("{}", too_few_for_alarms(object, *object_sequences, *needed))]
-    TooFewForAlarms {
-        /// The object with the fewest sequences.
-        object: String,
-        /// Its sequences.
-        object_sequences: usize,
-        /// Number of sequences of each object that it takes.
-        needed: u64,
-    },
     /// The model works on other rows than touches.
     #[error("the model works on rows of features, not on touches")]
     RawFeatures,
@@ -132,19 +116,6 @@ pub enum EvaluateProblem {
     },
 }
 
-fn too_few_for_alarms(object: &str, object_sequences: usize, needed: u64) -> String {
-    if (object_sequences as u64) < needed {
-        format!(
-            "the touches make only {object_sequences} sequences of {object}, and the promise takes at least {needed}"
-        )
-    } else {
-        format!(
-            "of {object_sequences} sequences of each object too many end as unknown at every threshold, so the promise takes \
-             more sequences"
-        )
-    }
-}
-
 impl Variant for EvaluateProblem {
     fn fix(&self) -> String {
         match self {
@@ -155,15 +126,8 @@ impl Variant for EvaluateProblem {
             Self::UnknownObject { .. } => "Train it on this object too, or take the object out of the data.",
             Self::KnownObject { .. } => "Take it out of the strangers, or train a model without it.",
             Self::MissingObject { .. } => "Capture touches of every object that the model knows.",
-            Self::TooFewForAlarms { object, object_sequences, needed }
-                if *object_sequences > 0 && (*object_sequences as u64) < *needed =>
-            {
-                let times = *needed as f64 / *object_sequences as f64;
-                return format!("Capture about {:.1} times as many touches of {object}.", (10.0 * times).ceil() / 10.0);
-            }
             Self::NoProbabilities { is_loaded: true } => "Compile its estimator again.",
             Self::NoProbabilities { is_loaded: false } => "Use `predict` or `margins`.",
-            Self::TooFewForMisfit { .. } | Self::TooFewForAlarms { .. } => "Capture more touches of every object.",
             Self::OverTouches => "Use `palpate verify` and `palpate evaluate` for models of touches.",
             Self::RawFeatures => {
                 "Give it rows of features: `palpate help recognize` and `palpate help evaluate` say how."
@@ -197,22 +161,4 @@ impl Variant for EvaluateProblem {
 /// True if the first of two different outputs is another placement of the same object.
 fn is_placement_of(one: &str, other: &str) -> bool {
     one != object_of(one) && object_of(one) == object_of(other)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn enough_sequences_with_too_many_alarms_are_not_said_to_be_too_few() {
-        let of = |object_sequences| {
-            let object = "bowl".to_owned();
-            EvaluateProblem::TooFewForAlarms { object, object_sequences, needed: 30 }
-        };
-        let said = |object_sequences| of(object_sequences).to_string();
-        assert!(said(20).contains("only 20 sequences of bowl") && said(20).ends_with("at least 30"));
-        assert_eq!(of(20).fix(), "Capture about 1.5 times as many touches of bowl.");
-        assert_eq!(of(0).fix(), "Capture more touches of every object.");
-        assert!(said(37).starts_with("of 37 sequences of each object too many end as unknown"), "{}", said(37));
-    }
 }

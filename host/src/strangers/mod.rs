@@ -27,9 +27,9 @@ pub use promised::calibrate_with_promise;
 #[cfg(feature = "objects")]
 pub use shapes::captured;
 
-use crate::calibrate::{Found, allowed, needed};
+use crate::calibrate::{Found, Stop, Tally, walk};
 use crate::compile::{self, Restated, restate};
-use crate::error::{Error, EvaluateProblem, Result};
+use crate::error::{Error, EvaluateProblem, Kind, Result, problem};
 use crate::evaluate::together::margins_of_touches;
 use crate::evaluate::{Candidate, OfTouches};
 use crate::touches::{Dataset, ObjectTouches, Pool};
@@ -170,8 +170,12 @@ pub(crate) fn calibrate_supplies(
     let (learn, test) = learned_and_tested(given, objects);
     let known = model.known_count();
     let moments = Moments::new(&learn, shapes, known, objects, unit);
-    let misfits =
-        misfit::misfits(&moments).ok_or(EvaluateProblem::TooFewForMisfit { found: learn_count(&learn, objects) })?;
+    let misfits = misfit::misfits(&moments).ok_or_else(|| {
+        let found = learn_count(&learn, objects);
+        problem!("an object has only {found} touches to learn the expected evidence from, or they are all alike")
+            .fix("Capture more touches of every object.")
+            .as_kind(Kind::TooFew)
+    })?;
     let terms = |threshold: f64| terms(settings, &misfits, threshold);
     // Levels of misfit do not depend on any threshold.
     let untested = stated(model, &terms(0.0), &misfits)?;
@@ -186,16 +190,16 @@ pub(crate) fn calibrate_supplies(
     let sequences = follow(&test, Ending::Named { level: loosest });
     let all = counted(&sequences, is_short);
     let tried = Tried { loosest, strictest };
-    let threshold = tried.threshold(&all, settings.alarms, settings.confidence).ok_or_else(|| {
-        let objects = if is_short { 1 } else { known.max(1) };
-        let needed = needed(settings.alarms, settings.confidence).div_ceil(objects as u64);
-        let names = compile::names(model);
+    let threshold = tried.threshold(&all, settings).map_err(|stop| {
         let fewest = (0..sequences.len()).min_by_key(|&object| sequences[object].len());
-        EvaluateProblem::TooFewForAlarms {
-            object: fewest.and_then(|object| names.get(object).cloned()).unwrap_or_default(),
-            object_sequences: all.len() / objects,
-            needed,
-        }
+        let remedy = match (stop.clone(), fewest) {
+            (Stop::TooFew { found, needed, .. }, Some(object)) if found > 0 => {
+                let (times, names) = (needed as f64 / found as f64, compile::names(model));
+                format!("Capture about {:.1} times as many touches of {}.", (10.0 * times).ceil() / 10.0, names[object])
+            }
+            _ => "Capture more touches of every object.".into(),
+        };
+        stop.problem(settings.alarms, "sequences of known objects", "called unknown").fix(remedy)
     })?;
     let [alarms, touches] = tried.ends(&all, threshold);
     let terms = MisfitTerms { sequences: u32::try_from(all.len()).unwrap_or(u32::MAX), ..terms(threshold) };
@@ -376,13 +380,17 @@ impl Tried {
         ends.map(|end| [u64::from(end.is_alarm), end.touches]).reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]])
     }
 
-    /// Learn-then-Test with fixed-sequence testing (Angelopoulos and others 2021): the last threshold before the first at
-    /// which the observed number of false alarms would not be unlikely if the promise were broken. None if there are too few
-    /// sequences, or too many alarms at the strictest.
-    fn threshold(&self, sequences: &[&Sequence], alarms: f64, confidence: f64) -> Option<f64> {
-        let allowed = allowed(sequences.len() as u64, alarms, confidence)?;
+    /// The loosest threshold that keeps the promise: walked over from the strictest, as all promises are.
+    ///
+    /// # Errors
+    /// [`Stop`], if there are too few sequences, or too many alarms at the strictest.
+    fn threshold(&self, sequences: &[&Sequence], settings: &Settings) -> Result<f64, Stop> {
         let steps = ((self.strictest - self.loosest) / STEP).round() as usize;
         let thresholds = (0..steps).map(|step| self.loosest + STEP * (steps - 1 - step) as f64);
-        thresholds.take_while(|&threshold| self.ends(sequences, threshold)[0] <= allowed).last()
+        let alarms = |threshold| {
+            let [wrong, _] = self.ends(sequences, threshold);
+            (threshold, vec![Tally { wrong, all: sequences.len() as u64 }])
+        };
+        Ok(walk(thresholds.map(alarms), &[0], settings.alarms, settings.confidence)?.threshold)
     }
 }
