@@ -99,11 +99,6 @@ pub enum Kind {
     Predictions,
     /// There is too little data for what was asked.
     TooFew,
-    /// Too many sequences of known objects end as unknown at every threshold that was tried.
-    TooManyAlarms {
-        /// Number of sequences of each object.
-        sequences: u64,
-    },
     /// Objects cannot be touched with all fingers.
     Untouchable {
         /// Their names.

@@ -10,8 +10,7 @@
 
 use super::terms::Terms;
 use super::walk::{allowed, needed, of_share};
-use crate::evidence::{Odds, Sequence, odds_of};
-use palpate_shared::format::Per;
+use crate::evidence::{self, Odds, Sequence, Unit, odds_of};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The most starts of a walk.
@@ -107,30 +106,18 @@ impl Seen {
     /// Names in sequences of these units, as for [`Begin::new`].
     pub(super) fn new(followed: &[Sequence], units: &[usize], tested: usize, terms: &Terms, margin: f64) -> Self {
         let odds = Odds::All(odds_of(margin));
-        // Of each case and unit: wrong names, names, sequences.
-        let mut sums: BTreeMap<(usize, usize), (f64, f64, f64)> = BTreeMap::new();
-        for (sequence, unit) in followed.iter().zip(units) {
-            let look = sequence.given(&odds);
-            let case = match terms.per {
-                Per::Average => Some(0),
-                Per::Object => Some(sequence.object),
-                Per::Name => look.map(|look| look.name),
-            };
-            let Some(case) = case else { continue };
-            let sum = sums.entry((case, *unit)).or_default();
-            sum.0 += f64::from(u8::from(look.is_some_and(|look| look.name != sequence.object)));
-            sum.1 += f64::from(u8::from(look.is_some()));
-            sum.2 += 1.0;
-        }
+        let outcomes =
+            followed.iter().zip(units).map(|(sequence, unit)| (sequence.object, *unit, sequence.outcome(&odds)));
+        let cases = evidence::units(outcomes, terms.per);
         let times = tested as f64 / units.iter().collect::<BTreeSet<_>>().len().max(1) as f64;
-        let mut cases: BTreeMap<usize, Names> = BTreeMap::new();
-        for ((case, _), (wrong, given, all)) in sums {
-            let names = cases.entry(case).or_default();
-            names.wrong += wrong / all;
-            names.given += given / all;
-            names.expected += times * given / all;
-        }
-        Self { margin, cases: cases.into_values().collect() }
+        let names = |units: BTreeMap<usize, Unit>| {
+            units.into_values().fold(Names::default(), |names, Unit { wrong, named, all }| Names {
+                wrong: names.wrong + wrong / all,
+                given: names.given + named / all,
+                expected: names.expected + times * named / all,
+            })
+        };
+        Self { margin, cases: cases.into_values().map(names).collect() }
     }
 
     /// A number of names expected of each case, none of them seen yet.
@@ -194,6 +181,7 @@ fn beta_binomial(most: u64, all: u64, a: f64, b: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::evidence::Lead;
+    use palpate_shared::format::Per;
 
     #[test]
     fn a_flat_prior_makes_every_number_of_errors_as_probable() {

@@ -207,6 +207,30 @@ pub(crate) struct Stated {
     pub(crate) noise: PromisedNoise,
 }
 
+impl Chosen {
+    /// The promise as a model states it.
+    pub(crate) fn promise(&self, terms: &Terms, stated: Stated) -> Promise {
+        let Terms { rate, confidence, per } = *terms;
+        let Stated { approaches, active, groups, max_touches, noise } = stated;
+        let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
+        let mean = if approaches { self.mean_approaches } else { self.mean_touches };
+        Promise {
+            rate,
+            confidence,
+            per,
+            approaches,
+            active,
+            groups,
+            sequences: count(self.sequences),
+            given: count(self.given),
+            wrong: count(self.wrong),
+            mean_thousandths: (1e3 * mean).round() as u32,
+            max_touches,
+            noise,
+        }
+    }
+}
+
 impl Calibrated {
     /// The model with thresholds that were chosen, a promise, and further sections.
     pub(crate) fn new(
@@ -218,24 +242,10 @@ impl Calibrated {
         further: Sections,
     ) -> Result<Self> {
         let Terms { rate, confidence, per } = *terms;
-        let Stated { approaches, active, groups, max_touches, noise } = stated;
-        let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
+        let promise = chosen.promise(terms, stated);
+        let (approaches, max_touches) = (promise.approaches, promise.max_touches);
         let (mean_touches, mean_approaches) = (chosen.mean_touches, approaches.then_some(chosen.mean_approaches));
         let used = Used::Touches { mean_touches, mean_approaches };
-        let promise = Promise {
-            rate,
-            confidence,
-            per,
-            approaches,
-            active,
-            groups,
-            sequences: count(chosen.sequences),
-            given: count(chosen.given),
-            wrong: count(chosen.wrong),
-            mean_thousandths: (1e3 * used.mean()).round() as u32,
-            max_touches,
-            noise,
-        };
         let by_object = match &chosen.odds {
             Odds::All(_) => None,
             Odds::ByObject(odds) => {

@@ -1,8 +1,9 @@
 //! Thresholds that keep a promise, from sequences.
 
 use super::begin::Seen;
+use super::groups::Bets;
 use super::terms::Terms;
-use super::walk::{Kept, Stop, Tally, walk};
+use super::walk::{Stop, Tally, walk};
 use crate::error::Result;
 use crate::evidence::{Odds, Sequence, odds_of, totals};
 use palpate_shared::format::Per;
@@ -92,7 +93,7 @@ pub fn choose(sequences: &[Sequence], objects: &[String], strictest: f64, terms:
     let count = Seen::nothing(names * share_tested(terms.per), strictest).most_starts(terms);
     let starts = spread(strictest, count, terms.rate);
     let way = Way { starts: &starts, loosest: None };
-    choose_independent(sequences, objects.len(), &way, terms).map_err(|stop| {
+    promise(&[], sequences, objects.len(), &way, terms).map_err(|stop| {
         let remedy = match stop.is_too_few(terms.rate) {
             true => "Give more sequences, or promise a higher error rate.",
             false => {
@@ -110,38 +111,41 @@ pub(crate) fn share_tested(per: Per) -> f64 {
     if per == Per::Name { 1.0 - share } else { 1.0 }
 }
 
-/// The thresholds that are kept, and the sequences that they were tested on.
-fn kept<'s>(
-    sequences: &'s [Sequence],
-    count: usize,
-    way: &Way<'_>,
-    terms: &Terms,
-) -> Result<(Kept<Odds>, Vec<&'s Sequence>), Stop> {
-    let Terms { rate, confidence, per } = *terms;
-    let (learn, tested) = match per {
-        Per::Average | Per::Object => (Vec::new(), sequences.iter().collect()),
-        Per::Name => learned_and_tested(sequences),
-    };
-    let Steps { odds, starts } = Steps::new(&learn, count, way, terms)?;
-    let tally = |odds| {
-        let tallies = tallies(&tested, &odds, By::of(per, count));
-        (odds, tallies)
-    };
-    let kept = walk(odds.into_iter().map(tally), &starts, rate, confidence)?;
-    Ok((kept, tested))
-}
-
-/// Like [`choose`], from given starts; `objects` is the number of objects.
+/// Chooses thresholds that keep a promise, as [`choose`], from given starts; `objects` is the number of objects. The promise is
+/// for new groups if sequences are of groups: these are tested by bets ([`Bets`]), which sequences of other groups,
+/// `learned_on`, help to choose. `learned_on` may be empty, and is not used without groups.
 ///
 /// # Errors
 /// [`Stop`], if no threshold can be kept.
-pub(crate) fn choose_independent(
+pub(crate) fn promise(
+    learned_on: &[Sequence],
     sequences: &[Sequence],
     objects: usize,
     way: &Way<'_>,
     terms: &Terms,
 ) -> Result<Chosen, Stop> {
-    let (kept, tested) = kept(sequences, objects, way, terms)?;
+    let Terms { rate, confidence, per } = *terms;
+    let by = By::of(per, objects);
+    let has_groups = sequences.iter().any(|sequence| sequence.group.is_some());
+    let (learn, tested) = match per {
+        Per::Name if !has_groups => learned_and_tested(sequences),
+        _ => (learned_on.iter().collect(), sequences.iter().collect()),
+    };
+    let Steps { odds, starts } = Steps::new(&learn, objects, way, terms)?;
+    let kept = if has_groups {
+        let bets = Bets::new(learned_on, sequences, (per, by.count()), (way.strictest(), starts.len()), terms);
+        let of = |odds: Odds| {
+            let bets = bets.at(&odds);
+            (odds, bets)
+        };
+        walk(odds.into_iter().map(of), &starts, rate, confidence)?
+    } else {
+        let of = |odds: Odds| {
+            let tallies = tallies(&tested, &odds, by);
+            (odds, tallies)
+        };
+        walk(odds.into_iter().map(of), &starts, rate, confidence)?
+    };
     Ok(summary(kept.threshold, kept.tallies, &tested, objects))
 }
 

@@ -13,11 +13,12 @@
 //! sequences for a binomial test: 299 at 1 %. The inverse of the product is thus a p-value, and thresholds are walked over as
 //! binomial tests are, from as many starts ([`walk`](super::walk())).
 
-use super::choose::{By, Steps, Way, grid, summary, tallies};
-use super::walk::{Level, Nearest, Stop, needed, of_share};
-use super::{Chosen, Terms};
-use crate::evidence::{Odds, Sequence, odds_of};
-use std::collections::{BTreeMap, BTreeSet};
+use super::choose::grid;
+use super::terms::Terms;
+use super::walk::{Tally, Test, of_share};
+use crate::evidence::{self, Odds, Sequence, Unit, odds_of};
+use palpate_shared::format::Per;
+use std::collections::BTreeSet;
 
 /// The most fractions that are tried.
 const FRACTIONS: u32 = 200;
@@ -29,42 +30,28 @@ struct Losses {
     of: Vec<f64>,
     /// Share of the sequences of each group that got a name.
     named: Vec<f64>,
-}
-
-impl Losses {
-    /// Number of groups that would have as many names if all of their sequences got one.
-    fn whole(&self) -> f64 {
-        self.named.iter().sum()
-    }
+    /// Names of all groups.
+    tally: Tally,
 }
 
 fn group_of(sequence: &Sequence) -> usize {
     sequence.group.unwrap_or(0)
 }
 
-/// The losses of each case.
-fn losses(sequences: &[Sequence], odds: &Odds, by: By, rate: f64) -> Vec<Losses> {
-    // Wrong names, names, sequences.
-    let mut sums: BTreeMap<(usize, usize), (f64, f64, f64)> = BTreeMap::new();
-    for sequence in sequences {
-        let look = sequence.given(odds);
-        let case = match by {
-            By::All => Some(0),
-            By::Touched(_) => Some(sequence.object),
-            By::Named(_) => look.map(|look| look.name),
-        };
-        let Some(case) = case.filter(|case| *case < by.count()) else { continue };
-        let sum = sums.entry((case, group_of(sequence))).or_default();
-        sum.0 += f64::from(u8::from(look.is_some_and(|look| look.name != sequence.object)));
-        sum.1 += f64::from(u8::from(look.is_some()));
-        sum.2 += 1.0;
-    }
-    let mut losses = vec![Losses::default(); by.count()];
-    for ((case, _), (wrong, named, all)) in sums {
-        losses[case].of.push((wrong - rate * named) / all);
-        losses[case].named.push(named / all);
-    }
-    losses
+/// The losses of each of so many cases.
+fn losses(sequences: &[Sequence], odds: &Odds, (per, cases): (Per, usize), rate: f64) -> Vec<Losses> {
+    let of = |sequence: &Sequence| (sequence.object, group_of(sequence), sequence.outcome(odds));
+    let mut units = evidence::units(sequences.iter().map(of), per);
+    let losses = |case| {
+        let mut losses = Losses::default();
+        for Unit { wrong, named, all } in units.remove(&case).unwrap_or_default().into_values() {
+            losses.of.push((wrong - rate * named) / all);
+            losses.named.push(named / all);
+            losses.tally = Tally { wrong: losses.tally.wrong + wrong as u64, all: losses.tally.all + named as u64 };
+        }
+        losses
+    };
+    (0..cases).map(losses).collect()
 }
 
 /// The fraction to bet, for a number of groups, from the losses of others: it tolerates the most errors of their size.
@@ -93,103 +80,94 @@ fn fraction(losses: &[f64], groups: f64, rate: f64, confidence: f64) -> f64 {
     allowed.max_by(|a, b| a.1.total_cmp(&b.1)).map_or(most, |(fraction, _)| fraction)
 }
 
-/// The bets for each case, from groups that are not tested: at the loosest threshold at which they seem to keep the rate.
-fn bets(learned_on: &[Sequence], by: By, strictest: f64, groups: usize, terms: &Terms) -> Vec<f64> {
+/// The fraction to bet for each case, from groups that are not tested: at the loosest threshold at which they seem to keep the rate.
+fn fractions(learned_on: &[Sequence], cases: (Per, usize), strictest: f64, groups: usize, terms: &Terms) -> Vec<f64> {
     let learned: BTreeSet<usize> = learned_on.iter().map(group_of).collect();
-    let mut seen = vec![Losses::default(); by.count()];
+    let mut seen = vec![Losses::default(); cases.1];
     for margin in grid(strictest, super::choose::LOOSEST).step_by(10) {
-        let losses = losses(learned_on, &Odds::All(odds_of(margin)), by, terms.rate);
+        let losses = losses(learned_on, &Odds::All(odds_of(margin)), cases, terms.rate);
         let is_kept = |losses: &Losses| losses.of.iter().sum::<f64>() <= 0.0;
         if !losses.iter().all(is_kept) {
             break;
         }
         seen = losses;
     }
-    let bet = |losses: &Losses| {
+    let fraction = |losses: &Losses| {
         // A case may be of some groups only.
         let share = if losses.of.is_empty() { 1.0 } else { losses.of.len() as f64 / learned.len() as f64 };
         fraction(&losses.of, share * groups as f64, terms.rate, terms.confidence)
     };
-    seen.iter().map(bet).collect()
+    seen.iter().map(fraction).collect()
 }
 
-/// Chooses thresholds that keep a promise for new groups, as [`choose`](super::choose()) does for independent sequences.
-/// `learned_on` are sequences of other groups than `tested`, which say how to bet; there may be none.
-///
-/// # Errors
-/// [`Stop`], if no threshold keeps the promise or too few groups are there to know.
-pub(crate) fn choose_groups(
-    learned_on: &[Sequence],
-    tested: &[Sequence],
-    objects: usize,
-    way: &Way<'_>,
-    terms: &Terms,
-) -> Result<Chosen, Stop> {
-    let by = By::of(terms.per, objects);
-    let groups: BTreeSet<usize> = tested.iter().map(group_of).collect();
-    // So that the share of one start is enough.
-    let terms_of_start = Terms { confidence: of_share(terms.confidence, way.starts.len()), ..*terms };
-    let bets = bets(learned_on, by, way.strictest(), groups.len(), &terms_of_start);
-    let own: Vec<&Sequence> = learned_on.iter().collect();
-    let odds = walk(tested, Steps::new(&own, objects, way, terms)?, by, &bets, terms)?;
-    let sequences: Vec<&Sequence> = tested.iter().collect();
-    let kept = tallies(&sequences, &odds, by);
-    Ok(summary(odds, kept, &sequences, objects))
+/// Bets on the groups of each case.
+pub(super) struct Bets<'s> {
+    tested: &'s [Sequence],
+    /// Cases that the rate is promised for, and the number of these.
+    cases: (Per, usize),
+    rate: f64,
+    fractions: Vec<f64>,
 }
 
-/// Fixed-sequence testing, as [`walk`](super::walk()) does for tallies. Thresholds at which no bet could be won with the share
-/// of one start even without an error are passed over: how many names there are decides that, not how many are errors.
-fn walk(tested: &[Sequence], steps: Steps, by: By, bets: &[f64], terms: &Terms) -> Result<Odds, Stop> {
-    let mut level = Level::new(&steps.starts, terms.confidence);
-    let share = of_share(terms.confidence, steps.starts.len());
-    // Slack for the last bits of a sum.
-    let enough = -(1.0 - share).ln() - 1e-9;
-    let mut kept = None;
-    let mut nearest = Nearest::default();
-    let mut most = vec![0.0_f64; by.count()];
-    for (position, odds) in steps.odds.into_iter().enumerate() {
-        let losses = losses(tested, &odds, by, terms.rate);
-        most.iter_mut().zip(&losses).for_each(|(most, losses)| *most = losses.whole().max(*most));
-        let own = level.at(position);
-        let could_pass = |(losses, bet): (&Losses, &f64)| {
-            losses.named.iter().map(|named| (bet * terms.rate * named).ln_1p()).sum::<f64>() >= enough
-        };
-        if !losses.iter().zip(bets).all(could_pass) {
-            continue;
-        }
-        let Some(own) = own else { continue };
-        let p_value = |(losses, bet): (&Losses, &f64)| {
-            let product: f64 = losses.of.iter().map(|loss| (-bet * loss).ln_1p()).sum();
-            (-product - 1e-9).exp()
-        };
-        let p_values: Vec<f64> = losses.iter().zip(bets).map(p_value).collect();
-        match Nearest::failed(&p_values, own) {
-            None => kept = Some(odds),
-            Some(position) => {
-                nearest.see(p_values[position], || {
-                    let sequences: Vec<&Sequence> = tested.iter().collect();
-                    let tally = tallies(&sequences, &odds, by).get(position).copied().unwrap_or_default();
-                    Stop::TooMany { position, tally, needed: None }
-                });
-                level.fail();
-                if level.is_over() {
-                    break;
-                }
-            }
-        }
+impl<'s> Bets<'s> {
+    /// Bets on the groups of `tested`, for a walk from this margin with so many starts. `learned_on` are sequences of other
+    /// groups, which say how to bet; there may be none.
+    pub(super) fn new(
+        learned_on: &[Sequence],
+        tested: &'s [Sequence],
+        cases: (Per, usize),
+        (strictest, starts): (f64, usize),
+        terms: &Terms,
+    ) -> Self {
+        let groups: BTreeSet<usize> = tested.iter().map(group_of).collect();
+        // So that the share of one start is enough.
+        let terms_of_start = Terms { confidence: of_share(terms.confidence, starts), ..*terms };
+        let fractions = fractions(learned_on, cases, strictest, groups.len(), &terms_of_start);
+        Self { tested, cases, rate: terms.rate, fractions }
     }
-    kept.ok_or_else(|| {
-        nearest.stop().unwrap_or_else(|| {
-            let position = (0..most.len()).min_by(|&a, &b| most[a].total_cmp(&most[b])).unwrap_or(0);
-            let found = most.get(position).copied().unwrap_or(0.0).round() as u64;
-            Stop::TooFew { position, found, needed: needed(terms.rate, share) }
-        })
-    })
+
+    /// The bets at thresholds.
+    pub(super) fn at(&self, odds: &Odds) -> Vec<Bet> {
+        let losses = losses(self.tested, odds, self.cases, self.rate);
+        losses.into_iter().zip(&self.fractions).map(|(losses, &fraction)| Bet { losses, fraction }).collect()
+    }
+}
+
+/// A bet on the groups of a case.
+pub(super) struct Bet {
+    losses: Losses,
+    fraction: f64,
+}
+
+impl Test for Bet {
+    /// Number of groups that would have as many names if all of their sequences got one.
+    fn cases(&self) -> f64 {
+        self.losses.named.iter().sum()
+    }
+
+    fn could_pass(&self, rate: f64, confidence: f64) -> bool {
+        let won = |named: &f64| (self.fraction * rate * named).ln_1p();
+        // Slack for the last bits of a sum.
+        self.losses.named.iter().map(won).sum::<f64>() >= -(1.0 - confidence).ln() - 1e-9
+    }
+
+    fn p_value(&self, _: f64) -> f64 {
+        let product: f64 = self.losses.of.iter().map(|loss| (-self.fraction * loss).ln_1p()).sum();
+        (-product - 1e-9).exp()
+    }
+
+    fn enough(&self, _: f64, _: f64) -> Option<u64> {
+        None
+    }
+
+    fn tally(&self) -> Tally {
+        self.losses.tally
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::Per;
+    use super::super::{Chosen, Stop, Way, promise};
     use super::*;
     use crate::evidence::Lead;
 
@@ -208,7 +186,7 @@ mod tests {
         let grouped = grouped(wrong, of);
         // As if a fifth as many others had been learned from.
         let learned = &grouped[..grouped.len() / 5 / of * of];
-        choose_groups(
+        promise(
             learned,
             &grouped,
             2,

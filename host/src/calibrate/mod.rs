@@ -59,25 +59,24 @@ pub(crate) use calibrated::Stated;
 pub use calibrated::{Calibrated, Gain, Guarded, OfObject, OfRecorded, OfRows, Used, Worse};
 pub(crate) use choose::share_tested;
 pub use choose::{Chosen, choose};
-pub(crate) use choose::{Way, choose_independent};
+pub(crate) use choose::{Way, promise};
 #[cfg(all(test, feature = "train"))]
 use draw::MarginSupply;
 pub use draw::{TouchSupply, follow};
 pub use found::Found;
 pub use fresh::{Captured, Fresh, calibrate_fresh, fresh};
-pub(crate) use groups::choose_groups;
 pub use model::{Settings, calibrate};
 #[cfg(feature = "train")]
 pub(crate) use model::{Start, add_noise, begin, calibrate_from};
 pub use palpate_shared::format::Per;
 pub use recorded::calibrate_recorded;
-pub(crate) use refused::{Tested, at_best, percent};
+pub(crate) use refused::{Tested, at_best};
 pub use terms::Terms;
 
 pub use temperature::temperature;
 pub use unlike::unlike_training;
 
 #[cfg(feature = "train")]
-pub(crate) use walk::allowed;
+pub(crate) use walk::walk;
 pub(crate) use walk::{Stop, binomial_tail};
 pub use walk::{Tally, needed};

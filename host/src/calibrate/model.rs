@@ -4,7 +4,7 @@
 use super::begin::Begin;
 use super::begin::Seen;
 use super::calibrated::{Calibrated, OfObject, Stated};
-use super::choose::{Chosen, Way, choose_independent, share_tested, spread};
+use super::choose::{Chosen, Way, promise, share_tested, spread};
 use super::draw::{TouchSupply, follow, follow_plan};
 use super::refused::{Supplied, Tested};
 use super::temperature::temperature;
@@ -303,7 +303,7 @@ pub(super) fn calibrate_drawn(
         }
     };
     let way = Way { starts: &starts, loosest: loosest.as_ref() };
-    let chosen = choose_independent(&sequences, names.len(), &way, &terms).map_err(|stop| {
+    let chosen = promise(&[], &sequences, names.len(), &way, &terms).map_err(|stop| {
         let both = [model.noise().unwrap_or_default(), dataset.real().and(&settings.noise).trained()];
         let what = if dataset.holds_approaches() { "approaches" } else { "touches" };
         let are_used_up = sequences.len() < material.wanted(settings.sequences).iter().sum();

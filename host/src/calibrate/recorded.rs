@@ -228,7 +228,7 @@ impl Foreseen {
             }
         };
         let cases = stop.cases("names given", names, per) + " on the recordings";
-        stop.problem(rate, &cases).fix(supported.unwrap_or_default() + &enough.unwrap_or_default() + remedy)
+        stop.problem(rate, &cases, "wrong").fix(supported.unwrap_or_default() + &enough.unwrap_or_default() + remedy)
     }
 }
 

@@ -23,8 +23,9 @@ impl Stop {
         }
     }
 
-    /// The problem without its remedy: too few cases, or too many wrong ones. `cases` are in words, such as "names given".
-    pub(crate) fn problem(&self, rate: f64, cases: &str) -> Error {
+    /// The problem without its remedy: too few cases, or too many bad ones. Both are in words: `cases` such as "names given",
+    /// and `bad` such as "wrong".
+    pub(crate) fn problem(&self, rate: f64, cases: &str, bad: &str) -> Error {
         let promised = percent(rate);
         let (Tally { wrong, all }, needed) = match *self {
             Self::TooFew { found, needed, .. } => (Tally { wrong: 0, all: found }, Some(needed)),
@@ -33,25 +34,27 @@ impl Stop {
                 let what = problem!(
                     "with the test of strangers no threshold keeps {promised} % that is as strict as without it"
                 );
-                return what.as_kind(Kind::NotKept);
+                return what.fix("Calibrate on more, or without the test.").as_kind(Kind::NotKept);
             }
         };
         if !self.is_too_few(rate) {
             let what = problem!(
-                "no threshold that was tested keeps {promised} %: at the best {wrong} of {all} {cases} are wrong"
+                "no threshold that was tested keeps {promised} %: at the best {wrong} of {all} {cases} are {bad}"
             );
             return what.as_kind(Kind::NotKept);
         }
         let most = if wrong == 0 { "none".into() } else { format!("no more than {wrong}") };
-        let needed = needed.map(|needed| format!(": at least {needed} are needed, {most} of them wrong"));
-        let needed = needed.unwrap_or_default();
-        problem!("{all} {cases} are too few to promise {promised} %{needed}").as_kind(Kind::TooFew)
+        let needed = match needed {
+            Some(needed) => format!("at least {needed} are needed, {most} of them {bad}"),
+            None => format!("{wrong} of them are {bad}"),
+        };
+        problem!("{all} {cases} are too few to promise {promised} %: {needed}").as_kind(Kind::TooFew)
     }
 
     /// Like [`Stop::problem`], of the names given: of the object that they are too few or too often wrong for, if the rate is
     /// promised for each.
     pub(crate) fn of_names(&self, names: &[String], terms: &Terms) -> Error {
-        self.problem(terms.rate, &self.cases("names given", names, terms.per))
+        self.problem(terms.rate, &self.cases("names given", names, terms.per), "wrong")
     }
 
     /// Cases in words, with the object that has the problem if the rate is promised for each.
@@ -100,12 +103,12 @@ pub(crate) struct Tested {
 impl Tested {
     /// The problem of names that were given in these sequences, and what would do.
     pub(crate) fn problem(&self, stop: &Stop, names: &[String], terms: &Terms) -> Error {
-        let advice = match *stop {
-            Stop::TooFew { found, needed, .. } => self.more(found, needed, terms.confidence),
-            Stop::TooMany { tally, .. } => self.remedy(tally, terms),
-            Stop::Looser => "Calibrate on more, or without the test.".into(),
-        };
-        stop.of_names(names, terms).fix(advice)
+        let problem = stop.of_names(names, terms);
+        match *stop {
+            Stop::TooFew { found, needed, .. } => problem.fix(self.more(found, needed, terms.confidence)),
+            Stop::TooMany { tally, .. } => problem.fix(self.remedy(tally, terms)),
+            Stop::Looser => problem,
+        }
     }
 
     /// Touches of each object that yield the names needed: in proportion.
@@ -232,7 +235,12 @@ mod tests {
                 "400 names given are too few to promise 1 %: at least 773 are needed, no more than 3 of them wrong",
                 Kind::TooFew,
             ),
-            (too_many(3, None), Per::Average, "400 names given are too few to promise 1 %", Kind::TooFew),
+            (
+                too_many(3, None),
+                Per::Average,
+                "400 names given are too few to promise 1 %: 3 of them are wrong",
+                Kind::TooFew,
+            ),
             (
                 too_many(14, Some(2_100)),
                 Per::Object,

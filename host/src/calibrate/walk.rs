@@ -38,13 +38,54 @@ pub struct Tally {
     pub all: u64,
 }
 
+/// A test of the hypothesis that an error rate is above the promised one, by what happened at a threshold.
+pub(crate) trait Test {
+    /// Number of cases.
+    fn cases(&self) -> f64;
+
+    /// True if the hypothesis would be rejected with this confidence if no case were an error.
+    fn could_pass(&self, rate: f64, confidence: f64) -> bool;
+
+    /// The p-value: the probability of as few errors, or a bound on it, if the rate were the promised one.
+    fn p_value(&self, rate: f64) -> f64;
+
+    /// Number of cases with which as many errors would pass; none where cases do not count alike.
+    fn enough(&self, rate: f64, confidence: f64) -> Option<u64>;
+
+    /// Errors, and cases.
+    fn tally(&self) -> Tally;
+}
+
+/// The binomial test of independent cases.
+impl Test for Tally {
+    fn cases(&self) -> f64 {
+        self.all as f64
+    }
+
+    fn could_pass(&self, rate: f64, confidence: f64) -> bool {
+        self.all >= needed(rate, confidence)
+    }
+
+    fn p_value(&self, rate: f64) -> f64 {
+        binomial_tail(*self, rate)
+    }
+
+    fn enough(&self, rate: f64, confidence: f64) -> Option<u64> {
+        Some(enough(self.wrong, rate, confidence))
+    }
+
+    fn tally(&self) -> Tally {
+        *self
+    }
+}
+
 /// A threshold that is kept, and what happened at it.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Kept<T> {
+pub(crate) struct Kept<T> {
     /// The threshold.
-    pub(super) threshold: T,
+    pub(crate) threshold: T,
     /// Results: one tally, or one of each that the rate is promised for.
-    pub(super) tallies: Vec<Tally>,
+    pub(crate) tallies: Vec<Tally>,
 }
 
 /// End of a walk without a threshold that is kept.
@@ -73,45 +114,45 @@ pub(crate) enum Stop {
 }
 
 /// Walks over `steps`, thresholds from strict to loose with what happened at each, and keeps the loosest one at which every
-/// tally passes: an error rate of at most `rate`, with probability `confidence`. `starts` are the positions of the thresholds
+/// test passes: an error rate of at most `rate`, with probability `confidence`. `starts` are the positions of the thresholds
 /// at which the walk may begin, ascending; before the first of them nothing is tested. They are chosen without a look at
 /// what happened. With one, and [`needed`] cases without an error, the rate can be promised; with several it takes more
 /// cases, and fewer walks end before they have begun.
 ///
-/// With several tallies all rates are kept at once with that probability, without dividing it among them: the
+/// With several tests all rates are kept at once with that probability, without dividing it among them: the
 /// hypothesis is that one of the rates is above, and to reject it every test has to (an intersection-union test).
-/// Thresholds whose tally is so small that it could not pass with the share of one start, even without an error, are
+/// Thresholds whose cases are so few that it could not pass with the share of one start, even without an error, are
 /// uninformative and skipped (Tarone, 1990): how many cases there are decides that, not how many are errors. That is exact as
 /// long as how many there are at one threshold says nothing about how many are errors at another.
 ///
 /// # Errors
 /// [`Stop`], if no threshold can be kept.
-pub(super) fn walk<T>(
-    steps: impl IntoIterator<Item = (T, Vec<Tally>)>,
+pub(crate) fn walk<T, E: Test>(
+    steps: impl IntoIterator<Item = (T, Vec<E>)>,
     starts: &[usize],
     rate: f64,
     confidence: f64,
 ) -> Result<Kept<T>, Stop> {
-    let needed = needed(rate, of_share(confidence, starts.len()));
+    let share = of_share(confidence, starts.len());
     let mut level = Level::new(starts, confidence);
     let mut kept = None;
     let mut nearest = Nearest::default();
     let mut most = Vec::new();
-    for (position, (threshold, tallies)) in steps.into_iter().enumerate() {
-        most.resize(tallies.len(), 0);
-        most.iter_mut().zip(&tallies).for_each(|(most, tally): (&mut u64, _)| *most = tally.all.max(*most));
+    for (position, (threshold, tests)) in steps.into_iter().enumerate() {
+        most.resize(tests.len(), 0.0_f64);
+        most.iter_mut().zip(&tests).for_each(|(most, test)| *most = test.cases().max(*most));
         let own = level.at(position);
-        if tallies.iter().any(|tally| tally.all < needed) {
+        if !tests.iter().all(|test| test.could_pass(rate, share)) {
             continue;
         }
         let Some(own) = own else { continue };
-        let tails: Vec<f64> = tallies.iter().map(|tally| binomial_tail(*tally, rate)).collect();
-        match Nearest::failed(&tails, own) {
-            None => kept = Some(Kept { threshold, tallies }),
+        let p_values: Vec<f64> = tests.iter().map(|test| test.p_value(rate)).collect();
+        match Nearest::failed(&p_values, own) {
+            None => kept = Some(Kept { threshold, tallies: tests.iter().map(Test::tally).collect() }),
             Some(position) => {
-                nearest.see(tails[position], || {
-                    let tally = tallies[position];
-                    Stop::TooMany { position, tally, needed: Some(enough(tally.wrong, rate, 1.0 - own)) }
+                nearest.see(p_values[position], || {
+                    let test = &tests[position];
+                    Stop::TooMany { position, tally: test.tally(), needed: test.enough(rate, 1.0 - own) }
                 });
                 level.fail();
                 if level.is_over() {
@@ -122,8 +163,9 @@ pub(super) fn walk<T>(
     }
     kept.ok_or_else(|| {
         nearest.stop().unwrap_or_else(|| {
-            let fewest = (0..most.len()).min_by_key(|&position| most[position]).unwrap_or(0);
-            Stop::TooFew { position: fewest, found: most.get(fewest).copied().unwrap_or(0), needed }
+            let fewest = (0..most.len()).min_by(|&a, &b| most[a].total_cmp(&most[b])).unwrap_or(0);
+            let found = most.get(fewest).copied().unwrap_or(0.0).round() as u64;
+            Stop::TooFew { position: fewest, found, needed: needed(rate, share) }
         })
     })
 }
@@ -134,7 +176,7 @@ pub(super) fn of_share(confidence: f64, starts: usize) -> f64 {
 }
 
 /// The level at which thresholds are tested along a walk.
-pub(super) struct Level<'s> {
+struct Level<'s> {
     starts: &'s [usize],
     whole: f64,
     /// Starts that were passed, and how many of their shares the walk has.
@@ -143,12 +185,12 @@ pub(super) struct Level<'s> {
 }
 
 impl<'s> Level<'s> {
-    pub(super) fn new(starts: &'s [usize], confidence: f64) -> Self {
+    fn new(starts: &'s [usize], confidence: f64) -> Self {
         Self { starts, whole: 1.0 - confidence, passed: 0, held: 0 }
     }
 
     /// The level at the threshold in this position, after all before; none where nothing is tested.
-    pub(super) fn at(&mut self, position: usize) -> Option<f64> {
+    fn at(&mut self, position: usize) -> Option<f64> {
         let new = self.starts.iter().skip(self.passed).take_while(|start| **start <= position).count();
         self.passed += new;
         self.held += new;
@@ -157,35 +199,35 @@ impl<'s> Level<'s> {
     }
 
     /// The threshold there was not rejected.
-    pub(super) fn fail(&mut self) {
+    fn fail(&mut self) {
         self.held = 0;
     }
 
     /// True if nothing more will be tested.
-    pub(super) fn is_over(&self) -> bool {
+    fn is_over(&self) -> bool {
         self.held == 0 && self.passed == self.starts.len()
     }
 }
 
 /// The failure that was nearest to passing.
 #[derive(Default)]
-pub(super) struct Nearest(Option<(f64, Stop)>);
+struct Nearest(Option<(f64, Stop)>);
 
 impl Nearest {
     /// The position of the largest p-value, if it is above the level.
-    pub(super) fn failed(p_values: &[f64], level: f64) -> Option<usize> {
+    fn failed(p_values: &[f64], level: f64) -> Option<usize> {
         let largest = (0..p_values.len()).max_by(|&a, &b| p_values[a].total_cmp(&p_values[b]).then(b.cmp(&a)))?;
         (p_values[largest] > level).then_some(largest)
     }
 
     /// A failure with this p-value.
-    pub(super) fn see(&mut self, p_value: f64, stop: impl FnOnce() -> Stop) {
+    fn see(&mut self, p_value: f64, stop: impl FnOnce() -> Stop) {
         if self.0.as_ref().is_none_or(|(nearest, _)| p_value < *nearest) {
             self.0 = Some((p_value, stop()));
         }
     }
 
-    pub(super) fn stop(self) -> Option<Stop> {
+    fn stop(self) -> Option<Stop> {
         self.0.map(|(_, stop)| stop)
     }
 }
@@ -320,7 +362,7 @@ mod tests {
         );
         let few = |found| Err(Stop::TooFew { position: 0, found, needed: 299 });
         assert_eq!(walk((0..).zip(tallies(&[0], 298)), &[0], 0.01, 0.95), few(298));
-        assert_eq!(walk(Vec::<(i32, _)>::new(), &[0], 0.01, 0.95), few(0));
+        assert_eq!(walk(Vec::<(i32, Vec<Tally>)>::new(), &[0], 0.01, 0.95), few(0));
     }
 
     #[test]

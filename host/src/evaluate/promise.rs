@@ -30,10 +30,28 @@ impl Finding {
     pub fn of(wrong: usize, given: usize, rate: f64) -> Self {
         Wrong { wrong: wrong as f64, given: given as f64, spread: given as f64 }.finding_of(rate, 1)
     }
+
+    /// Finding about an error rate, not a number without names, compared with a promised one: one of `number` that are looked
+    /// at. `chance` is the probability of as many errors if the promise is just kept.
+    pub(crate) fn of_error(error: f64, rate: f64, number: usize, chance: impl FnOnce() -> f64) -> Self {
+        match () {
+            () if error.is_nan() => Self::Untested,
+            () if error <= rate => Self::Kept,
+            () if chance() < BY_CHANCE / number.max(1) as f64 => Self::Broken,
+            () => Self::Unclear,
+        }
+    }
+
+    /// Finding about a promise that is for each of these.
+    pub(crate) fn of_each(each: impl IntoIterator<Item = Self>) -> Self {
+        let each: Vec<Self> = each.into_iter().collect();
+        let worst = [Self::Broken, Self::Unclear, Self::Kept].into_iter().find(|finding| each.contains(finding));
+        worst.unwrap_or(Self::Untested)
+    }
 }
 
 /// The probability of errors that a promise just kept is taken to be able to make.
-pub(crate) const BY_CHANCE: f64 = 0.01;
+const BY_CHANCE: f64 = 0.01;
 
 /// Check of a model's promise on test touches. Shares are of the names that are given; a sequence that ends undecided
 /// counts as neither right nor wrong.
@@ -270,27 +288,15 @@ impl Wrong {
     /// Finding about all of these, each compared with `rate`.
     fn finding<'w>(all: impl Iterator<Item = &'w Self> + Clone, rate: f64) -> Finding {
         let number = all.clone().count();
-        let each = || all.clone().map(|wrong| Self::finding_of(*wrong, rate, number));
-        match () {
-            () if all.clone().all(|wrong| wrong.given <= 0.0) => Finding::Untested,
-            () if each().any(|finding| finding == Finding::Broken) => Finding::Broken,
-            () if each().any(|finding| finding == Finding::Unclear) => Finding::Unclear,
-            () => Finding::Kept,
-        }
+        Finding::of_each(all.map(|wrong| wrong.finding_of(rate, number)))
     }
 
     /// Finding about one of `number` that are looked at.
     fn finding_of(self, rate: f64, number: usize) -> Finding {
-        if self.given <= 0.0 {
-            return Finding::Untested;
-        }
-        if self.share() <= rate {
-            return Finding::Kept;
-        }
-        let trials = self.effective().round().max(1.0);
-        let errors = (self.share() * trials).round().max(1.0);
-        let chance = at_least(errors, trials, rate);
-        if chance < BY_CHANCE / number.max(1) as f64 { Finding::Broken } else { Finding::Unclear }
+        Finding::of_error(self.share(), rate, number, || {
+            let trials = self.effective().round().max(1.0);
+            at_least((self.share() * trials).round().max(1.0), trials, rate)
+        })
     }
 }
 

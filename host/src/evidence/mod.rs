@@ -18,7 +18,7 @@ mod tests;
 
 pub(crate) use chip::{Chip, chip};
 pub use outcome::Outcome;
-pub(crate) use outcome::Totals;
+pub(crate) use outcome::{Totals, Unit, units};
 use palpate_onboard::{Familiarity, Verdict};
 pub(crate) use sequence::totals;
 pub use sequence::{Lead, Odds, Sequence, margin_of, odds_of};

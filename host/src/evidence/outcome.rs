@@ -1,5 +1,8 @@
 //! Outcomes of sequences, which every figure is a function of.
 
+use palpate_shared::format::Per;
+use std::collections::BTreeMap;
+
 /// Outcome of a sequence.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Outcome {
@@ -73,4 +76,36 @@ impl Totals {
     pub(crate) fn mean_approaches(&self) -> f64 {
         self.share(self.approaches)
     }
+}
+
+/// Sequences that count together: a group of them, or one that is independent of the others.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Unit {
+    /// Wrong names.
+    pub(crate) wrong: f64,
+    /// Names.
+    pub(crate) named: f64,
+    /// Sequences.
+    pub(crate) all: f64,
+}
+
+/// The units of each case that a rate is of, from sequences by class, unit and outcome.
+pub(crate) fn units(
+    outcomes: impl IntoIterator<Item = (usize, usize, Outcome)>,
+    per: Per,
+) -> BTreeMap<usize, BTreeMap<usize, Unit>> {
+    let mut cases = BTreeMap::<usize, BTreeMap<usize, Unit>>::new();
+    for (class, unit, outcome) in outcomes {
+        let case = match per {
+            Per::Average => Some(0),
+            Per::Object => Some(class),
+            Per::Name => outcome.recognized,
+        };
+        let Some(case) = case else { continue };
+        let unit = cases.entry(case).or_default().entry(unit).or_default();
+        unit.wrong += f64::from(u8::from(outcome.is_wrong(class)));
+        unit.named += f64::from(u8::from(outcome.recognized.is_some()));
+        unit.all += 1.0;
+    }
+    cases
 }

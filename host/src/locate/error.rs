@@ -2,7 +2,6 @@
 
 use super::pose::Until;
 use super::stated::FARTHEST;
-use crate::calibrate::percent;
 use crate::error::Variant;
 use palpate_onboard::ModelError;
 
@@ -124,16 +123,6 @@ pub enum LocateProblem {
     /// There is noise that a simulated table does not have.
     #[error("a simulated table has other noise")]
     Noise,
-    /// There are too few recordings for a promise, even without any error.
-    #[error("{found} recordings are too few to promise {} %: at least {needed} are needed, with a name in each sequence and none wrong", percent(*rate))]
-    FewRecordings {
-        /// The promised rate.
-        rate: f64,
-        /// Recordings, each by the share of its sequences that got a name.
-        found: u64,
-        /// Recordings that are needed.
-        needed: u64,
-    },
     /// Places do not become as sure as they are to be.
     #[error(
         "of {right} objects that were named rightly only {placed} had a place as sure as {} mm and {}° within {approaches} approaches",
@@ -206,9 +195,6 @@ impl Variant for LocateProblem {
             Self::Slanted { .. } => "Level the table, or turn the frame of positions so that z is 0 all over it.",
             Self::Trees => "Give a directory of touches, or a model that was trained on touches with a position.",
             Self::Noise => "Use noise, timer, missed (one share for all fingers), position and drift.",
-            Self::FewRecordings { .. } => {
-                "Record the objects in more places, or promise a higher error rate; more touches in the same places do not help."
-            }
             Self::Untold { .. } => {
                 "Train maps on more approaches, of less noise or with smaller cells, or calibrate without the test."
             }

@@ -6,7 +6,7 @@ use super::pose::{Equivalents, Off, Until};
 use super::world::{Aimed, Drawn, Real, Standing, World};
 use super::write::{Restated, restated};
 use super::{Effort, Hand, Maps, Promised, Seen, TESTED, locating};
-use crate::calibrate::{self, Begin, Chosen, Stop, Way, choose_groups, choose_independent, margin_of, odds_of};
+use crate::calibrate::{self, Begin, Chosen, Stop, Way, margin_of, odds_of, promise};
 use crate::error::{Error, Result};
 use crate::evaluate::Finding;
 use crate::evidence::{self, Follower, Given, Limit, Outcome, Sequence, Totals};
@@ -16,7 +16,6 @@ use crate::progress::{self, Progress};
 use crate::random::{self, Purpose};
 use crate::touches::{Dataset, ObjectTouches, Pool};
 use palpate_onboard::{Familiarity, Stopping};
-use palpate_shared::format::Promise;
 use rand::seq::SliceRandom;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -247,7 +246,7 @@ pub fn calibrate(
     let sequences = follow(opened(&bytes)?, standing, probe, terms, strictest(terms), progress)?;
     let way = Way { starts: &starts, loosest: None };
     let names = super::names(&maps);
-    let chosen = choose_independent(&sequences, names.len(), &way, &terms.promise).map_err(|stop| {
+    let chosen = promise(&[], &sequences, names.len(), &way, &terms.promise).map_err(|stop| {
         let both = [super::stated(&maps), terms.real].map(|real| real.noise(probe.speed).to_string());
         let noise = (both[0] != both[1]).then_some(both);
         let tested = calibrate::Tested { supplied: None, sequences: sequences.len(), noise };
@@ -321,9 +320,12 @@ pub fn calibrate_recorded(
     let sequences = pools.into_par_iter().map(of).collect::<Result<Vec<_>>>()?.concat();
     let rate = terms.promise.rate;
     let way = Way { starts: &[strictest(terms)], loosest: None };
-    let chosen = choose_groups(&[], &sequences, names.len(), &way, &terms.promise).map_err(|stop| match stop {
-        Stop::TooFew { found, needed, .. } => Error::from(LocateProblem::FewRecordings { rate, found, needed }),
-        _ => stop.problem(rate, "names given").fix("Promise a higher error rate, or record more."),
+    let chosen = promise(&[], &sequences, names.len(), &way, &terms.promise).map_err(|stop| match stop {
+        Stop::TooFew { .. } => stop.problem(rate, "recordings", "wrong").fix(
+            "A recording counts by the share of its sequences that get a name. Record the objects in more places, or promise a \
+             higher error rate; more touches in the same places do not help.",
+        ),
+        _ => stop.problem(rate, "names given", "wrong").fix("Promise a higher error rate, or record more."),
     })?;
     promised(maps, &chosen, probe, terms, plain, Some(count))
 }
@@ -337,24 +339,17 @@ fn promised(
     stated: Restated,
     recordings: Option<usize>,
 ) -> Result<Calibrated> {
-    let calibrate::Terms { rate, confidence, per } = terms.promise;
+    let calibrate::Terms { rate, confidence, .. } = terms.promise;
     let odds = chosen.odds.strictest();
     let noise = terms.real.noise(probe.speed);
-    let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
-    let promise = Promise {
-        rate,
-        confidence,
-        per,
+    let stated_terms = calibrate::Stated {
         approaches: true,
         active: terms.aimed == Aimed::Chosen,
         groups: recordings.is_some(),
-        sequences: count(chosen.sequences),
-        given: count(chosen.given),
-        wrong: count(chosen.wrong),
-        mean_thousandths: (chosen.mean_approaches * 1_000.0).round() as u32,
         max_touches: terms.max_touches,
         noise: noise.promised(),
     };
+    let promise = chosen.promise(&terms.promise, stated_terms);
     let model = restated(maps, &Restated { odds, promise: Some(promise), ..stated })?;
     Ok(Calibrated {
         model,

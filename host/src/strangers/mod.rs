@@ -27,7 +27,7 @@ pub use promised::calibrate_with_promise;
 #[cfg(feature = "objects")]
 pub use shapes::captured;
 
-use crate::calibrate::{Found, allowed, needed};
+use crate::calibrate::{Found, Stop, Tally, walk};
 use crate::compile::{self, Restated, restate};
 use crate::error::{Error, Kind, Result, problem};
 use crate::evaluate::together::margins_of_touches;
@@ -145,7 +145,7 @@ impl Pools {
 /// this test and does not hold with it: the model states it no more. [`calibrate_with_promise`] finds both.
 ///
 /// # Errors
-/// Those of an evaluation; [`Kind::TooFew`] for too few touches, [`Kind::TooManyAlarms`]; [`Kind::Setting`]
+/// Those of an evaluation; [`Kind::TooFew`] for too few touches; [`Kind::NotKept`]; [`Kind::Setting`]
 /// for shares that are none.
 pub fn calibrate(
     model: &Model<'_>,
@@ -190,13 +190,16 @@ pub(crate) fn calibrate_supplies(
     let sequences = follow(&test, Ending::Named { level: loosest });
     let all = counted(&sequences, is_short);
     let tried = Tried { loosest, strictest };
-    let threshold = tried.threshold(&all, settings.alarms, settings.confidence).ok_or_else(|| {
-        let objects = if is_short { 1 } else { known.max(1) };
-        let needed = needed(settings.alarms, settings.confidence).div_ceil(objects as u64);
-        let names = compile::names(model);
+    let threshold = tried.threshold(&all, settings).map_err(|stop| {
         let fewest = (0..sequences.len()).min_by_key(|&object| sequences[object].len());
-        let object = fewest.and_then(|object| names.get(object)).map_or("", String::as_str);
-        no_threshold(object, (all.len() / objects) as u64, needed)
+        let remedy = match (stop.clone(), fewest) {
+            (Stop::TooFew { found, needed, .. }, Some(object)) if found > 0 => {
+                let (times, names) = (needed as f64 / found as f64, compile::names(model));
+                format!("Capture about {:.1} times as many touches of {}.", (10.0 * times).ceil() / 10.0, names[object])
+            }
+            _ => MORE_TOUCHES.into(),
+        };
+        stop.problem(settings.alarms, "sequences of known objects", "called unknown").fix(remedy)
     })?;
     let [alarms, touches] = tried.ends(&all, threshold);
     let terms = MisfitTerms { sequences: u32::try_from(all.len()).unwrap_or(u32::MAX), ..terms(threshold) };
@@ -213,26 +216,6 @@ pub(crate) fn calibrate_supplies(
 
 /// Remedy for too few touches.
 const MORE_TOUCHES: &str = "Capture more touches of every object.";
-
-/// The problem of a test without a threshold: `found` sequences of each object are too few, where it takes `needed`, or too many
-/// of them end as unknown. The object with the fewest sequences is named.
-fn no_threshold(object: &str, found: u64, needed: u64) -> Error {
-    if found >= needed {
-        return problem!(
-            "of {found} sequences of each object too many end as unknown at every threshold, so the promise takes more sequences"
-        )
-        .fix(MORE_TOUCHES)
-        .as_kind(Kind::TooManyAlarms { sequences: found });
-    }
-    let times = needed as f64 / found as f64;
-    let fix = match found {
-        0 => MORE_TOUCHES.into(),
-        _ => format!("Capture about {:.1} times as many touches of {object}.", (10.0 * times).ceil() / 10.0),
-    };
-    problem!("the touches make only {found} sequences of {object}, and the promise takes at least {needed}")
-        .fix(fix)
-        .as_kind(Kind::TooFew)
-}
 
 /// `as` saturates.
 fn millionths(share: f64) -> u32 {
@@ -403,13 +386,17 @@ impl Tried {
         ends.map(|end| [u64::from(end.is_alarm), end.touches]).reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]])
     }
 
-    /// Learn-then-Test with fixed-sequence testing (Angelopoulos and others 2021): the last threshold before the first at
-    /// which the observed number of false alarms would not be unlikely if the promise were broken. None if there are too few
-    /// sequences, or too many alarms at the strictest.
-    fn threshold(&self, sequences: &[&Sequence], alarms: f64, confidence: f64) -> Option<f64> {
-        let allowed = allowed(sequences.len() as u64, alarms, confidence)?;
+    /// The loosest threshold that keeps the promise: walked over from the strictest, as all promises are.
+    ///
+    /// # Errors
+    /// [`Stop`], if there are too few sequences, or too many alarms at the strictest.
+    fn threshold(&self, sequences: &[&Sequence], settings: &Settings) -> Result<f64, Stop> {
         let steps = ((self.strictest - self.loosest) / STEP).round() as usize;
         let thresholds = (0..steps).map(|step| self.loosest + STEP * (steps - 1 - step) as f64);
-        thresholds.take_while(|&threshold| self.ends(sequences, threshold)[0] <= allowed).last()
+        let alarms = |threshold| {
+            let [wrong, _] = self.ends(sequences, threshold);
+            (threshold, vec![Tally { wrong, all: sequences.len() as u64 }])
+        };
+        Ok(walk(thresholds.map(alarms), &[0], settings.alarms, settings.confidence)?.threshold)
     }
 }

@@ -3,9 +3,9 @@
 use super::Rows;
 use super::parts::{Parts, what};
 use super::settings::StrangerTest;
-use crate::calibrate::{Found, needed, odds_of, percent};
+use crate::calibrate::{Found, needed, odds_of};
 use crate::compile::{self, Restated, restate};
-use crate::error::{Error, Kind, Result, problem};
+use crate::error::{Error, Kind, Result};
 use crate::strangers::{self, Pools};
 use palpate_shared::format::Tag;
 use palpate_trees::rows::RowSequence;
@@ -59,28 +59,21 @@ pub(super) fn test<'s>(
     Ok((tested.bytes, parts, found))
 }
 
-/// The problem of a test that sequences are too few for, in numbers of these.
+/// The problem of a test, and what to do with sequences of rows.
 fn problem(error: Error, parts: &Parts<'_>, settings: &strangers::Settings) -> Error {
-    let strangers::Settings { alarms, confidence, .. } = *settings;
-    match *error.kind() {
-        Kind::TooManyAlarms { sequences } => {
-            let alarms = percent(alarms);
-            problem!(
-                "of the {sequences} sequences that test for strangers more than {alarms} % end as unknown at every threshold"
-            )
-            .fix("Train the model on rows like these, so that they fit their classes, or calibrate without the test.")
-        }
+    match error.kind() {
         Kind::TooFew => {
             // Three quarters of the part that is for the test are tested on.
-            let needed = needed(alarms, confidence) as f64 / (0.75 * TESTED * parts.share_tested());
-            let needed = needed.ceil() as u64;
-            let (found, what, alarms) = (parts.units, what(parts.has_groups), percent(alarms));
-            problem!(
-                "{found} {what} are too few for a test of strangers with at most {alarms} % false alarms: at least {needed} are \
-                 needed, as a part of them tests it"
-            )
-            .fix("Record more, or calibrate without the test.")
+            let needed = needed(settings.alarms, settings.confidence) as f64 / (0.75 * TESTED * parts.share_tested());
+            let (needed, what) = (needed.ceil(), what(parts.has_groups));
+            error.fix(format!(
+                "It takes about {needed} {what} in all, because only a part of them tests for strangers; there are {}. Record more, \
+                 or calibrate without the test.",
+                parts.units
+            ))
         }
+        Kind::NotKept => error
+            .fix("Train the model on rows like these, so that they fit their classes, or calibrate without the test."),
         _ => error,
     }
 }

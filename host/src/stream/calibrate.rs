@@ -8,8 +8,7 @@ use super::settings::Settings;
 use super::shape::{self, Fitted, STRICTEST, shaped};
 use super::{Rows, check, check_columns, guard, rows_of, taken};
 use crate::calibrate::{
-    Begin, Calibrated, Chosen, Guarded, Limit, Odds, OfRows, Stated, Stop, Terms, Used, Way, choose_groups,
-    choose_independent, share_tested,
+    Begin, Calibrated, Chosen, Guarded, Limit, Odds, OfRows, Stated, Stop, Terms, Used, Way, promise, share_tested,
 };
 use crate::compile::{self, Restated, restate};
 use crate::error::{Result, problem};
@@ -192,11 +191,8 @@ impl Followed<'_> {
         let margin = starts.first().copied().unwrap_or(STRICTEST);
         let limit = Limit { margin, max_touches: self.max_rows };
         let tested = follow(model, self.rows, &parts.tested, limit);
-        if !parts.has_groups {
-            return choose_independent(&tested, self.names, &way, &self.terms);
-        }
-        let learned = follow(model, self.rows, &parts.learned, limit);
-        choose_groups(&learned, &tested, self.names, &way, &self.terms)
+        let learned = if parts.has_groups { follow(model, self.rows, &parts.learned, limit) } else { Vec::new() };
+        promise(&learned, &tested, self.names, &way, &self.terms)
     }
 }
 

@@ -5,8 +5,8 @@ use super::{Rows, check, rows_of, taken};
 use crate::compile;
 use crate::error::Result;
 use crate::evaluate::Finding;
-use crate::evaluate::promise::{BY_CHANCE, at_least};
-use crate::evidence::{Chip, Given, Outcome, Totals, chip, outcome};
+use crate::evaluate::promise::at_least;
+use crate::evidence::{self, Chip, Given, Outcome, Totals, Unit, chip, outcome};
 use palpate_onboard::{Model, Recognizer, Stopping};
 use palpate_shared::format::{Per, Promise};
 use palpate_trees::rows::{RowSequence, Sequences};
@@ -208,28 +208,15 @@ fn check_promise(
     ends: &[Outcome],
     names: &[String],
 ) -> PromiseOfSequences {
-    let case = |sequence: &RowSequence, end: &Outcome| match promise.per {
-        Per::Average => Some(0),
-        Per::Object => Some(sequence.class),
-        Per::Name => end.recognized,
+    let outcome = |(number, (sequence, end)): (usize, (&RowSequence, &Outcome))| {
+        (sequence.class, sequence.group.filter(|_| promise.groups).unwrap_or(number), *end)
     };
+    let mut units = evidence::units(sequences.iter().zip(ends).enumerate().map(outcome), promise.per);
     let cases = if promise.per == Per::Average { 1 } else { names.len() };
-    let mut units = vec![BTreeMap::<usize, Unit>::new(); cases];
-    for (number, (sequence, end)) in sequences.iter().zip(ends).enumerate() {
-        let Some(case) = case(sequence, end).and_then(|case| units.get_mut(case)) else { continue };
-        let unit = case.entry(sequence.group.filter(|_| promise.groups).unwrap_or(number)).or_default();
-        unit.all += 1.0;
-        unit.named += f64::from(u8::from(end.recognized.is_some()));
-        unit.wrong += f64::from(u8::from(end.is_wrong(sequence.class)));
-    }
-    let found: Vec<(f64, f64)> = units.iter().map(|units| Unit::error(units, promise)).collect();
-    let is_above = |(error, _): &&(f64, f64)| *error > promise.rate;
-    let finding = match () {
-        () if found.iter().all(|(error, _)| error.is_nan()) => Finding::Untested,
-        () if found.iter().filter(is_above).any(|(_, chance)| *chance < BY_CHANCE / cases as f64) => Finding::Broken,
-        () if found.iter().any(|(error, _)| *error > promise.rate) => Finding::Unclear,
-        () => Finding::Kept,
-    };
+    let found = (0..cases).map(|case| error(&units.remove(&case).unwrap_or_default(), promise));
+    let found: Vec<(f64, f64)> = found.collect();
+    let finding = |&(error, chance): &(f64, f64)| Finding::of_error(error, promise.rate, cases, || chance);
+    let finding = Finding::of_each(found.iter().map(finding));
     let given = found.iter().enumerate().filter(|(_, (error, _))| !error.is_nan());
     let worst = given.max_by(|(_, a), (_, b)| a.0.total_cmp(&b.0));
     let (own, found) = worst.map_or((0, 0.0), |(own, (error, _))| (own, *error));
@@ -237,34 +224,24 @@ fn check_promise(
     PromiseOfSequences { promised: promise.rate, per: promise.per.name(), groups: promise.groups, found, of, finding }
 }
 
-/// Names of a sequence, or of a group of them.
-#[derive(Clone, Copy, Debug, Default)]
-struct Unit {
-    wrong: f64,
-    named: f64,
-    all: f64,
-}
-
-impl Unit {
-    /// The error rate of units that weigh the same, and the probability of one as high if the promise is just kept; not a
-    /// number if there is no name.
-    fn error(units: &BTreeMap<usize, Self>, promise: &Promise) -> (f64, f64) {
-        let sum = |of: &dyn Fn(&Self) -> f64| units.values().map(|unit| of(unit) / unit.all).sum::<f64>();
-        let (wrong, named) = (sum(&|unit| unit.wrong), sum(&|unit| unit.named));
-        if named == 0.0 {
-            return (f64::NAN, 1.0);
-        }
-        if !promise.groups {
-            return (wrong / named, if wrong > 0.0 { at_least(wrong, named, promise.rate) } else { 1.0 });
-        }
-        // Of a ratio of means: its residuals, at the promised rate.
-        let count = units.len() as f64;
-        let residual = |unit: &Self| unit.wrong - promise.rate * unit.named;
-        let mean = sum(&residual) / count;
-        let variance = units.values().map(|unit| (residual(unit) / unit.all - mean).powi(2)).sum::<f64>() / count;
-        let errors = mean / (variance / count).sqrt().max(f64::MIN_POSITIVE);
-        (wrong / named, 0.5 * libm::erfc(errors * std::f64::consts::FRAC_1_SQRT_2))
+/// The error rate of units that weigh the same, and the probability of one as high if the promise is just kept; not a
+/// number if there is no name.
+fn error(units: &BTreeMap<usize, Unit>, promise: &Promise) -> (f64, f64) {
+    let sum = |of: &dyn Fn(&Unit) -> f64| units.values().map(|unit| of(unit) / unit.all).sum::<f64>();
+    let (wrong, named) = (sum(&|unit| unit.wrong), sum(&|unit| unit.named));
+    if named == 0.0 {
+        return (f64::NAN, 1.0);
     }
+    if !promise.groups {
+        return (wrong / named, if wrong > 0.0 { at_least(wrong, named, promise.rate) } else { 1.0 });
+    }
+    // Of a ratio of means: its residuals, at the promised rate.
+    let count = units.len() as f64;
+    let residual = |unit: &Unit| unit.wrong - promise.rate * unit.named;
+    let mean = sum(&residual) / count;
+    let variance = units.values().map(|unit| (residual(unit) / unit.all - mean).powi(2)).sum::<f64>() / count;
+    let errors = mean / (variance / count).sqrt().max(f64::MIN_POSITIVE);
+    (wrong / named, 0.5 * libm::erfc(errors * std::f64::consts::FRAC_1_SQRT_2))
 }
 
 /// A model and rows.

@@ -131,7 +131,7 @@ impl<'s> Parts<'s> {
             Stop::TooFew { .. } if self.has_groups => format!("of {units} groups of sequences with {cases}"),
             _ => format!("{cases} in {units} {}", what(self.has_groups)),
         };
-        let problem = stop.problem(settings.rate, &cases);
+        let problem = stop.problem(settings.rate, &cases, "wrong");
         match *stop {
             Stop::TooFew { found, .. } => problem.fix(more(found, self.has_groups, settings)),
             Stop::TooMany { .. } if stop.is_too_few(settings.rate) => {
@@ -140,7 +140,7 @@ impl<'s> Parts<'s> {
             Stop::TooMany { .. } => problem.fix(
                 "Promise a higher error rate, give sequences of more rows, or train the model on rows like these.",
             ),
-            Stop::Looser => problem.fix("Calibrate on more, or without the test."),
+            Stop::Looser => problem,
         }
     }
 
@@ -159,7 +159,7 @@ pub(super) fn what(groups: bool) -> &'static str {
 /// Too few sequences, or groups, even if no name is wrong.
 fn too_few(found: u64, needed: u64, groups: bool, settings: &Settings) -> Error {
     let stop = Stop::TooFew { position: 0, found, needed };
-    stop.problem(settings.rate, what(groups)).fix(more(found, groups, settings))
+    stop.problem(settings.rate, what(groups), "wrong").fix(more(found, groups, settings))
 }
 
 /// The remedy for too few names, sequences or groups.

@@ -136,7 +136,10 @@ fn what_cannot_be_calibrated_says_so() {
     assert!(message(&of(0..2, 1_000, 2), &usual).contains("no touches of object2"));
     assert!(message(&of(0..4, 1_000, 2), &usual).contains("object3"));
     let few = message(&of(0..KNOWN, 200, 2), &usual);
-    assert!(few.contains("sequences of object") && few.contains("times as many touches of object"), "{few}");
+    assert!(
+        few.contains("sequences of known objects are too few") && few.contains("times as many touches of object"),
+        "{few}"
+    );
     assert!(message(&of(0..KNOWN, 1_000, 2), &with!(usual, alarms = 0.0)).contains("alarms is 0"));
     let strangers = measured(&model, &of(0..KNOWN, 100, 1), &of(0..KNOWN, 100, 1));
     let error = strangers.err().unwrap().to_string();
