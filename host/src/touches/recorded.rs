@@ -1,4 +1,4 @@
-//! What a data set states of a recording.
+//! The statement of a data set about a recording.
 
 /// A recording of one object: when, from where and by what its touches came.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]

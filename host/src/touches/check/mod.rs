@@ -186,10 +186,5 @@ fn key(touch: &Touch) -> Key {
     (touch.times().map(|time| time.micros()), pose, touch.position().map(|position| position.micrometers))
 }
 
-/// The time between the first and the last contact, in seconds.
-fn last(touch: &Touch) -> f64 {
-    f64::from(touch.times().iter().filter_map(|time| time.micros()).max().unwrap_or_default()) / 1e6
-}
-
 #[cfg(test)]
 mod tests;

@@ -84,7 +84,7 @@ impl ObjectSummary {
             duplicates,
             posed: touches.iter().filter(|touch| touch.pose().is_some()).count() as u64,
             located: touches.iter().filter(|touch| touch.position().is_some()).count() as u64,
-            longest: touches.iter().map(super::last).fold(0.0, f64::max),
+            longest: touches.iter().map(|touch| f64::from(touch.spread()) / 1e6).fold(0.0, f64::max),
             curvature: feature(0),
             slope: feature(1),
         }
