@@ -215,7 +215,7 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize> Locates for
             let found = locator.poses(locator.best(), poses);
             PlaceMessage {
                 table_alone: locator.met_table_alone(),
-                exhausted: locator.exhausted().is_some(),
+                exhausted: locator.touches() > 0 && locator.exhausted().is_some(),
                 place: poses.get(..found).and_then(|found| found.get(rank)).copied(),
             }
         })

@@ -134,7 +134,7 @@ fn verdicts_places_and_approaches_over_a_line_that_loses_bytes_are_those_of_a_lo
         let (mut kept, mut room, mut locator) = (Kept::new(), Room::new(), locator(&BOTH));
         let mut line = Line::new(&BOTH, &mut kept, &mut room, loses);
         for (place, yaw) in [([12.0, -9.0], 0.6), ([-20.0, 17.0], 2.4)] {
-            let nowhere = PlaceMessage { table_alone: false, exhausted: locator.exhausted().is_some(), place: None };
+            let nowhere = PlaceMessage { table_alone: false, exhausted: false, place: None };
             assert_eq!(line.ask(Request::Place { rank: 0 }), format!("Place({nowhere:?})"));
             let mut at = Approach { x: 0, y: 0, roll: 40 };
             let mut verdict = Verdict::Undecided;
