@@ -255,18 +255,22 @@ fn named(object: &Object) -> Vec<String> {
     object.instances().filter(|_| has_several).map(|instance| instance.name.clone()).collect()
 }
 
-/// The scenes of each object, built side by side: one for each instance or, on a table, for each placement of each instance.
-///
-/// # Errors
-/// A mesh that makes no scene, by its object's name.
-pub fn scenes(objects: &[&Object], origin: &Origin, progress: &dyn Progress) -> Result<Vec<Vec<Scene>>> {
-    let in_object = |object: &Object, error: Error| match error {
+/// An error of an object's mesh, with the object's name.
+pub(crate) fn in_object(object: &Object, error: Error) -> Error {
+    match error {
         Error::At { problem, .. } => {
             let (detail, fix) = (problem.to_string(), problem.fix());
             CaptureProblem::Object { name: object.name.clone(), detail, fix }.into()
         }
         other => other.in_file(&object.name),
-    };
+    }
+}
+
+/// The scenes of each object, built side by side: one for each instance or, on a table, for each placement of each instance.
+///
+/// # Errors
+/// A mesh that makes no scene, by its object's name.
+pub fn scenes(objects: &[&Object], origin: &Origin, progress: &dyn Progress) -> Result<Vec<Vec<Scene>>> {
     let length = |(object, instance): (&Object, &Instance)| -> Result<f64> {
         let unknown = || CaptureProblem::NoTrueSize { name: object.name.clone() };
         let length = origin.length_of(object, instance).ok_or_else(unknown)?;

@@ -176,7 +176,7 @@ impl Problem for EvaluateProblem {
                 "Add one: `palpate calibrate MODEL DIR -o OUT --plan 4`, from approaches with pose. An ensemble (JSON) has to be exported first."
             }
             Self::Located => {
-                "Train maps on touches with a position (`palpate train`), or leave positions out."
+                "Make maps of them (`palpate maps train --teach`), or leave the positions out."
             }
             Self::OneObjectToPlan => "Train a model of two objects or more.",
             Self::NoApproaches => "Capture every approach: --approaches N --pose.",

@@ -77,6 +77,8 @@ commands! {
     Capture => capture,
     /// Train an ensemble on captured touches
     Train => train,
+    /// Make height maps of objects on a table
+    Maps => maps,
     /// Compile an ensemble to the bytes that the chip reads
     Export => export,
     /// Set thresholds that keep an error rate, or plan approaches
@@ -203,7 +205,7 @@ fn remark(text: &str) {
 /// The commands as the program's help lists them.
 const GROUPS: [(&str, &[&str]); 5] = [
     ("Everything at once", &["run", "report"]),
-    ("Step by step", &["capture", "train", "export", "calibrate", "evaluate", "recognize"]),
+    ("Step by step", &["capture", "train", "maps train", "export", "calibrate", "evaluate", "recognize"]),
     ("A real probe", &["probe fit", "data record", "data check", "link"]),
     ("Models from elsewhere", &["export", "verify"]),
     ("Look", &["inspect", "view", "data objects"]),
