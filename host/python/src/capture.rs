@@ -155,9 +155,7 @@ pub(crate) fn sources(meshes: Vec<PathBuf>) -> Result<Vec<(String, String)>, Fai
 ///
 /// `touches` full touches of each object are kept, or with `approaches=True` that many approaches whether fingers touch or not;
 /// `approaches=500` are 500 approaches. `pose` keeps the probe's direction and alignment. With `cone` the objects lie on a
-/// table in each of their placements, and approaches come within that many degrees of straight down. `position` keeps where
-/// the hand was, too, of all approaches
-/// straight down to objects of true size on a table; `within` is how far from an object's middle they aim at most. The same
+/// table in each of their placements, and approaches come within that many degrees of straight down. The same
 /// `seed` gives the same touches on any number of `threads`, and the same as the program's. `samples` are the first of
 /// a part of these touches or approaches, from 0, and the one after its last. With `instances` a directory inside a directory
 /// is one object. With `out` the touches are written there as `palpate capture` does: `force` is its option.
@@ -172,9 +170,9 @@ pub(crate) fn sources(meshes: Vec<PathBuf>) -> Result<Vec<(String, String)>, Fai
 /// ((200, 3), True)
 #[pyo3::pyfunction]
 #[pyo3(signature = (meshes, *, touches=21_000, seed=1, probe=None, approaches=Approaches::Kept(false), pose=false, aim="box", cone=None,
-    position=false, within=None, length=10.0, millimeters=None, instances=false, samples=None, out=None, force=false,
+    length=10.0, millimeters=None, instances=false, samples=None, out=None, force=false,
     threads=None, progress=None))]
-#[expect(clippy::too_many_arguments, clippy::fn_params_excessive_bools, reason = "they are keywords in Python")]
+#[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub(crate) fn capture(
     py: Python<'_>,
     meshes: Meshes,
@@ -185,8 +183,6 @@ pub(crate) fn capture(
     pose: bool,
     aim: &str,
     cone: Option<f64>,
-    position: bool,
-    within: Option<f64>,
     length: f64,
     millimeters: Option<f64>,
     instances: bool,
@@ -210,11 +206,9 @@ pub(crate) fn capture(
         length,
         probe: probe.map(|Probe(probe)| probe).unwrap_or_default(),
         aim: Aim::from_name(aim).ok_or_else(|| Error::setting("aim", aim, "box, middle or mass"))?,
-        pose: pose || position,
-        position,
-        within,
-        approaches: approaches || position,
-        scene: cone.or(position.then_some(0.0)).map_or(Surroundings::Floating, |cone| Surroundings::Table { cone }),
+        pose,
+        approaches,
+        scene: cone.map_or(Surroundings::Floating, |cone| Surroundings::Table { cone }),
         samples: samples
             .map(|(first, end)| format!("{first}..{end}").parse::<Samples>())
             .transpose()

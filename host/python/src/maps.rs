@@ -9,7 +9,6 @@ use crate::objects::{self, Probe, Real, class};
 use crate::recognizer::numbers;
 use crate::work::{Callback, long};
 use palpate::calibrate::{self, Per};
-use palpate::capture::{self, Settings as Capture};
 use palpate::compile;
 use palpate::error::{Error, LocateProblem, Place};
 use palpate::locate::{self, Aimed, Approach, Hand, Heights, MapsFile, Promised, Seen, Settings, Terms, Until};
@@ -17,8 +16,7 @@ use palpate::mesh::Object;
 use palpate::mesh::facts::sides;
 use palpate::onboard::Verdict;
 use palpate::output;
-use palpate::shared::format::Length;
-use palpate::touches::{Dataset, Origin, Surroundings, located, touch_of_seconds};
+use palpate::touches::{located, touch_of_seconds};
 use palpate::with;
 use pyo3::inspect::PyStaticExpr;
 use pyo3::prelude::*;
@@ -32,7 +30,7 @@ use std::sync::Arc;
 ///
 /// >>> import palpate
 /// >>> probe = palpate.Probe(radius=1.5, spacing=15, speed=100, tilt=0, stroke=20)
-/// >>> maps = palpate.Maps.of_meshes(["bowl", "mouse"], probe=probe, millimeters=10, approaches=10_000)
+/// >>> maps = palpate.Maps.of_meshes(["bowl", "mouse"], probe=probe, millimeters=10)
 /// >>> maps.objects
 /// ['bowl', 'mouse']
 /// >>> maps.placements[0]
@@ -55,11 +53,6 @@ impl Maps {
     fn maps(&self) -> &locate::Maps<'_> {
         self.opened.borrow_dependent()
     }
-
-    fn learned(dataset: &Dataset, settings: &Settings) -> palpate::Result<Self> {
-        let surfaces = locate::learn(dataset, settings)?;
-        Self::of(locate::write(&surfaces, &dataset.names(), &locate::probe_of(dataset)?, settings)?)
-    }
 }
 
 /// Settings as Python states them.
@@ -73,13 +66,14 @@ fn settings(Real(real): &Real, cell: f64, range: f64, error_rate: f64, max_touch
     Ok(settings)
 }
 
-/// Objects at their true size.
+/// Objects at their true size, by name.
 fn sized(meshes: Meshes, millimeters: Option<f64>) -> palpate::Result<Vec<Object>> {
     if let Some(wrong) = millimeters.filter(|length| !length.is_finite() || *length <= 0.0) {
         return Err(Error::setting("millimeters", wrong, "a finite number above 0"));
     }
     let mut objects = meshes.objects(false)?;
     objects.iter_mut().for_each(|object| object.millimeters = object.millimeters.or(millimeters));
+    objects.sort_by(|a, b| a.name.cmp(&b.name));
     Ok(objects)
 }
 
@@ -113,7 +107,8 @@ impl Played {
     ) -> palpate::Result<T> {
         let objects = sized(self.objects, self.millimeters)?;
         let probe = locate::hand(maps)?;
-        let standing = locate::standing(&objects.iter().collect::<Vec<_>>(), &probe, progress)?;
+        let noise = locate::stated(maps).height;
+        let standing = locate::standing(&objects.iter().collect::<Vec<_>>(), &probe, noise, progress)?;
         with(&standing, &probe, &self.terms)
     }
 }
@@ -151,7 +146,7 @@ impl Maps {
         })?)
     }
 
-    /// Learns maps from touches with positions, simulated (`capture` with `position`) or recorded.
+    /// Learns maps from recorded touches with positions.
     ///
     /// `real` is what is known of hand and table, `cell` the side of a map's cells (1 or 2 mm), `range` half of the side of the
     /// square about the table's origin in which objects are looked for, in millimeters.
@@ -168,49 +163,42 @@ impl Maps {
     ) -> Result<Self, Failure> {
         let settings = settings(&real.unwrap_or_default(), cell, range, error_rate, max_touches)?;
         let dataset = Arc::clone(&data.get().dataset);
-        long(py, None, |_| Self::learned(&dataset, &settings))
+        long(py, None, |_| {
+            let surfaces = locate::learn(&dataset, &settings)?;
+            Self::of(locate::write(&surfaces, &dataset.names(), &locate::probe_of(&dataset)?, &settings)?)
+        })
     }
 
-    /// Maps of meshes, without a data set on the disk: each placement is touched in a simulation, then `learn` does the rest.
+    /// Maps of meshes in every pose that they rest in: what a fingertip meets in the middle of each cell. Poses that look the same to
+    /// contacts of this noise have one map.
     ///
     /// `meshes` are as for `capture`, at their true size: `millimeters` is the length of a unit of those that state none. The
     /// `probe` is in millimeters.
     #[staticmethod]
-    #[pyo3(signature = (meshes, *, probe, millimeters=None, approaches=200_000, real=None, cell=1.0, range=30.0, error_rate=0.01,
-        max_touches=25, seed=1, progress=None))]
+    #[pyo3(signature = (meshes, *, probe, millimeters=None, real=None, cell=1.0, range=30.0, error_rate=0.01, max_touches=25,
+        progress=None))]
     #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
     fn of_meshes(
         py: Python<'_>,
         meshes: Meshes,
         probe: Probe,
         millimeters: Option<f64>,
-        approaches: u64,
         real: Option<Real>,
         cell: f64,
         range: f64,
         error_rate: f64,
         max_touches: u32,
-        seed: u64,
         progress: Option<Callback>,
     ) -> Result<Self, Failure> {
         let settings = settings(&real.unwrap_or_default(), cell, range, error_rate, max_touches)?;
         let Probe(probe) = probe;
-        let origin = Origin {
-            touches: approaches,
-            seed,
-            unit: Length::Millimeter,
-            probe,
-            scene: Surroundings::Table { cone: 0.0 },
-            pose: true,
-            position: true,
-            approaches: true,
-            ..Origin::default()
-        };
         let (maps, odd) = long(py, progress.as_ref(), |progress| {
             let objects = sized(meshes, millimeters)?;
-            let odd = odd_sizes(&objects, &origin.probe, range);
-            let (dataset, _) = capture::in_memory(&objects, &Capture::from(origin), progress)?;
-            Ok((Self::learned(&dataset, &settings)?, odd))
+            let odd = odd_sizes(&objects, &probe, range);
+            let standing = locate::standing(&objects.iter().collect::<Vec<_>>(), &probe, settings.noise, progress)?;
+            let names: Vec<String> = standing.iter().map(|object| object.name.clone()).collect();
+            let cast = locate::cast(&standing, &probe, &settings)?;
+            Ok((Self::of(locate::write(&cast, &names, &probe, &settings)?)?, odd))
         })?;
         for note in odd {
             note_of(py, &note)?;
@@ -428,7 +416,7 @@ impl<'a, 'py> FromPyObject<'a, 'py> for Row {
 ///
 /// >>> import palpate
 /// >>> probe = palpate.Probe(radius=1.5, spacing=15, speed=100, tilt=0, stroke=20)
-/// >>> maps = palpate.Maps.of_meshes(["bowl", "mouse"], probe=probe, millimeters=10, approaches=10_000)
+/// >>> maps = palpate.Maps.of_meshes(["bowl", "mouse"], probe=probe, millimeters=10)
 /// >>> locator = palpate.Locator(maps)
 /// >>> x, y, roll = locator.next()
 /// >>> located = locator.push_heights((None, 20.0, 17.0), x, y, roll, lowest=0.0)

@@ -275,12 +275,16 @@ fn named(object: &Object) -> Vec<String> {
     object.instances().filter(|_| has_several).map(|instance| instance.name.clone()).collect()
 }
 
+/// An error of an object's mesh, with the object's name.
+pub(crate) fn in_object(object: &Object, error: Error) -> Error {
+    error.within(format_args!("{}: ", object.name))
+}
+
 /// The scenes of each object, built side by side: one for each instance or, on a table, for each placement of each instance.
 ///
 /// # Errors
 /// A mesh that makes no scene, by its object's name.
 pub fn scenes(objects: &[&Object], origin: &Origin, progress: &dyn Progress) -> Result<Vec<Vec<Scene>>> {
-    let in_object = |object: &Object, error: Error| error.within(format_args!("{}: ", object.name));
     let length = |(object, instance): (&Object, &Instance)| -> Result<f64> {
         let length = origin.length_of(object, instance)?;
         // A mesh without extent is refused below, with a better reason. Rotated, its box may be longer.

@@ -5,11 +5,11 @@
 
 use crate::error::{Error, Kind, Result, problem};
 use crate::mesh::facts::sides;
+use crate::probe::Probe;
 use crate::probe::approach::{Approach, FINGERS};
 use crate::probe::hand;
 use crate::probe::noise::Noise;
 use crate::probe::scene::Scene;
-use crate::probe::{Located, Probe};
 use crate::random::{self, Purpose};
 use crate::touches::Origin;
 use glam::DVec3;
@@ -91,11 +91,6 @@ impl<'a> Sampler<'a> {
         // What the real probe adds has a stream of its own, so that the approaches stay the same with it and without.
         let mut added = (!self.origin.real.is_none())
             .then(|| random::generator(self.origin.seed, Purpose::Capture, self.name, index));
-        if self.origin.position {
-            let noise = added.as_mut().map(|random| (&self.origin.real, random));
-            let Located { touch, late, is_turned_back } = self.draw(&mut rng, scene).locate(scene, probe, noise);
-            return Ok(Drawn { touch, approaches: 1, late: late.map(u64::from), turned_back: is_turned_back.into() });
-        }
         let Noise { grazing, .. } = self.origin.real;
         let (window, mut late, mut turned_back) = (probe.window(), [0; FINGERS], 0);
         for approaches in 1..=MOST_ATTEMPTS {
@@ -139,10 +134,7 @@ impl<'a> Sampler<'a> {
     fn draw(&self, rng: &mut Xoshiro256PlusPlus, scene: &Scene) -> Approach {
         let origin = self.origin;
         let clearance = origin.clearance(scene.bounds());
-        match origin.position {
-            true => Approach::draw_down(rng, scene, &origin.probe, origin.region(scene.bounds()), clearance),
-            false => Approach::draw_to(rng, scene, origin.aim.target(scene), origin.probe.tilt, clearance),
-        }
+        Approach::draw_to(rng, scene, origin.aim.target(scene), origin.probe.tilt, clearance)
     }
 
     fn rng(&self, index: u64) -> Xoshiro256PlusPlus {

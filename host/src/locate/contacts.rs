@@ -23,13 +23,3 @@ pub(super) fn tips(touch: &Touch, probe: &Probe) -> Option<[Met; FINGERS]> {
         height: z + finger * row[2],
     }))
 }
-
-/// Heights that the fingers of a touch met; none without a position or pose.
-pub(super) fn heights(touch: &Touch, probe: &Probe) -> Option<[Option<Met>; FINGERS]> {
-    let (tips, times) = (tips(touch, probe)?, touch.times());
-    Some(std::array::from_fn(|finger| {
-        let micros = times[finger].micros()?;
-        let Met { x, y, height } = tips[finger];
-        Some(Met { x, y, height: height - f64::from(micros) * 1e-6 * probe.speed })
-    }))
-}

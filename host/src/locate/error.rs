@@ -23,7 +23,7 @@ pub enum LocateProblem {
     /// There is nothing to learn from.
     #[error("there are no objects to make maps of")]
     NoObjects,
-    /// No touch met an object.
+    /// No touch met an object, or it is too flat.
     #[error("{object}: no touch met it{}", named(placement))]
     NotMet {
         /// The object.
@@ -173,7 +173,7 @@ impl Variant for LocateProblem {
             Self::NoPosition { .. } => {
                 "State the position of every touch, or of none: the last three columns of a line."
             }
-            Self::Unit => "Capture with `--scene table --position`, or state the probe in millimeters.",
+            Self::Unit => "State the probe in millimeters.",
             Self::NoObjects => "Give at least one mesh, or touches of one object.",
             Self::NotMet { .. } => "Touch it, or leave it out.",
             Self::Placements { .. } => "Leave objects out, or placements that are rare.",

@@ -1,12 +1,12 @@
 //! Recognition of an object and its place on a table, from touches of a hand whose position is known.
 //!
 //! ```text
-//! touches with positions ──learn──► surfaces ──write──► maps ──► locator ──► verdict, poses, next approach
-//!                                                        │           ▲
-//!                            objects on a simulated table (world) ───┴──► sequences ──► thresholds, promise
+//!     meshes ──standing──► poses on a table ──cast──┬──► surfaces ──write──► maps ──► locator ──► verdict, poses, next approach
+//!  recorded touches with positions ──────────learn──┘                          │           ▲
+//!                                           the same poses on a simulated table (world) ───┴──► sequences ──► thresholds, promise
 //! ```
 //!
-//! [`learn`](fn@learn) makes a height map of each placement, [`write`](fn@write) the model that a chip reads, [`locating`] follows
+//! [`cast`] and [`learn`](fn@learn) make a height map of each placement, [`write`](fn@write) the model that a chip reads, [`locating`] follows
 //! approaches with the chip's own code, and [`calibrate`](fn@calibrate) finds thresholds that keep a promise on approaches to
 //! objects on a simulated table, chosen or at random.
 
@@ -16,6 +16,7 @@ mod follow;
 mod grid;
 mod inspect;
 mod learn;
+mod lying;
 mod pose;
 mod promise;
 mod register;
@@ -31,7 +32,8 @@ mod write;
 
 pub use follow::{BELOW, CELLS, Locating, TOUCHES, locating, seen, within, workspace};
 pub use inspect::{Cost, Inspected, MapsFile, OfPlacement, Promised, hand, inspect, names, stated};
-pub use learn::{learn, probe_of};
+pub use learn::{cast, learn, probe_of};
+pub use lying::Lying;
 pub use palpate_onboard::locate::{Approach, Effort, Hand, Maps, POSE, Pose, Seen, TESTED};
 pub use pose::{Off, Until};
 pub use promise::{

@@ -1,11 +1,10 @@
 //! Poses against the truth, modulo symmetry, and how wide their intervals must be.
 
+use super::lying::{Onto, TURNS, radians};
 use super::surface::{SAME, Surface};
 use super::world::{Standing, Truth};
-use super::{Maps, Pose};
+use super::{Lying, Maps, Pose};
 use crate::probe::approach::Probe;
-use crate::probe::scene::Scene;
-use glam::DVec3;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
@@ -54,28 +53,29 @@ impl Off {
     }
 }
 
-/// Turns by which a placement on the table looks like one of the maps.
+/// Turns by which poses on the table look like placements of the maps.
 pub(super) struct Equivalents {
-    /// For each object and placement that stands, and each placement of the maps, turns in radians; each looks more alike than
-    /// its neighbors, so a turn that differs a little is not excused.
-    turns: Vec<Vec<Vec<Vec<f64>>>>,
+    /// Each object has one for each of its poses.
+    objects: Vec<Vec<Equivalent>>,
 }
 
-/// Turns that are compared.
-const TURNS: usize = 120;
-
-/// A compared turn.
-fn radians(turn: usize) -> f64 {
-    turn as f64 / TURNS as f64 * TAU
+/// Turns by which a pose looks like placements of the maps.
+struct Equivalent {
+    /// The first pose that looks the same, which has the turns.
+    first: usize,
+    onto: Onto,
+    /// For each placement of the maps, turns in radians; each looks more alike than its neighbors, so a turn that differs a little is
+    /// not excused.
+    turns: Vec<Vec<f64>>,
 }
 
 impl Equivalents {
-    /// Compares all placements. Cost: some seconds for a hundred of them.
+    /// Compares all that look different. Cost: some seconds for a hundred of them.
     pub(super) fn new(maps: Maps<'_>, standing: &[Standing], probe: &Probe) -> Self {
         let known: Vec<Surface> = (0..maps.placements()).map(|index| of_maps(maps, index)).collect();
         let of = |object: &Standing| {
-            let own = |scene: &Scene| {
-                let surface = pressed(scene, probe);
+            let turns = |lying: &Lying| {
+                let surface = Surface::cast(lying, probe.radius, 1.0);
                 let differences = |known: &Surface| -> Vec<f64> {
                     let is_of = maps.object_name(known.object) == object.name;
                     let differs = |turn| if is_of { surface.differs(known, radians(turn)) } else { f64::INFINITY };
@@ -92,23 +92,31 @@ impl Equivalents {
                 };
                 each.iter().map(alike).collect()
             };
-            object.placements.iter().map(|(scene, _)| own(scene)).collect()
+            let own = |(index, lying): (usize, &Lying)| Equivalent {
+                first: lying.first,
+                onto: lying.onto,
+                turns: if lying.first == index { turns(lying) } else { Vec::new() },
+            };
+            object.placements.iter().enumerate().map(own).collect()
         };
-        Self { turns: standing.par_iter().map(of).collect() }
+        Self { objects: standing.par_iter().map(of).collect() }
     }
 
     /// Distance of a pose from the nearest equivalent of the truth; none if the object lies in another way.
     pub(super) fn off(&self, truth: &Truth, pose: &Pose) -> Option<Off> {
-        let turns = self.turns.get(truth.object)?.get(truth.placement)?.get(usize::from(pose.placement))?;
+        let object = self.objects.get(truth.object)?;
+        let own = object.get(truth.placement)?;
+        let turns = object.get(own.first)?.turns.get(usize::from(pose.placement))?;
+        let (place, turned) = own.onto.placed(truth.place, truth.yaw);
         let [x, y] = pose.position.map(|micrometers| f64::from(micrometers) / 1_000.0);
         let yaw = f64::from(pose.yaw) / 65_536.0 * TAU;
         let degrees = |turn: f64| {
-            let apart = (yaw - truth.yaw - turn).rem_euclid(TAU);
+            let apart = (yaw - turned - turn).rem_euclid(TAU);
             apart.min(TAU - apart).to_degrees()
         };
         let least = turns.iter().map(|turn| degrees(*turn)).min_by(f64::total_cmp)?;
         let degrees = if pose.yaw_within.is_none() { 0.0 } else { least };
-        Some(Off { millimeters: [x - truth.place[0], y - truth.place[1]], degrees })
+        Some(Off { millimeters: [x - place[0], y - place[1]], degrees })
     }
 }
 
@@ -120,18 +128,5 @@ fn of_maps(maps: Maps<'_>, index: usize) -> Surface {
     let placement = u8::try_from(index).unwrap_or(u8::MAX);
     let reach = (maps.radius(placement) / 1_000 + 3).min(250);
     let height = |[i, j]: [i32; 2]| f64::from(maps.height(placement, [i * 1_000, j * 1_000])) / 1_000.0;
-    Surface::of(usize::from(maps.object_of(placement)), [reach; 2], height)
-}
-
-/// The surface that fingertips would meet, in cells of 1 mm.
-fn pressed(scene: &Scene, probe: &Probe) -> Surface {
-    let [low, high] = scene.bounds();
-    let reach = [high.x, high.y].map(|half| (half + probe.radius).ceil() as i32 + 1);
-    let start = high.z + 2.0 * probe.radius;
-    let height = |[i, j]: [i32; 2]| {
-        let from = DVec3::new(f64::from(i), f64::from(j), start);
-        let way = scene.first_contact(from, DVec3::NEG_Z, probe.radius);
-        way.map_or(0.0, |way| (start - way - probe.radius - low.z).max(0.0))
-    };
-    Surface::of(0, reach, height)
+    Surface::of(usize::from(maps.object_of(placement)), [reach; 2], 1.0, height)
 }

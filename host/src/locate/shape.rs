@@ -4,15 +4,16 @@ use super::contacts::{Met, tips};
 use super::error::LocateProblem;
 use super::follow::seen;
 use super::grid::{connected, index, pieces, places};
-use super::{Approach, Hand, Standing};
+use super::{Approach, Hand, Lying, Standing};
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
 use crate::probe::approach::{FINGERS, Probe};
-use crate::probe::scene::{Scene, Table};
+use crate::probe::scene::Scene;
 use glam::{DMat3, DVec3};
 use palpate_shared::Touch;
 use rayon::prelude::*;
 use std::collections::HashSet;
+use std::sync::Arc;
 
 /// A cell's guess is a plane through as many of the nearest samples.
 const NEAR: usize = 10;
@@ -145,9 +146,8 @@ impl Shape {
     pub fn standing(&self, name: &str) -> Result<Standing> {
         let mesh = self.relief().solid(self.probe.radius);
         let [low, high] = mesh.bounds();
-        let table = Table { instance: 0, placement: String::new(), weight: 1.0, cone: 0.0 };
-        let scene = Scene::on_table(&mesh, (high - low).max_element().into(), DMat3::IDENTITY, table)?;
-        Ok(Standing { name: name.into(), placements: vec![(scene, 1.0)] })
+        let scene = Scene::new(&mesh, (high - low).max_element().into())?;
+        Ok(Standing::of(name, vec![Lying::new(Arc::new(scene), DMat3::IDENTITY, String::new(), 1.0)]))
     }
 
     /// All samples.

@@ -224,23 +224,18 @@ fn dataset(objects: Vec<ObjectTouches>) -> Dataset {
 }
 
 #[test]
-fn an_object_learned_on_the_table_is_recognized_beside_simulated_ones() {
+fn an_object_learned_on_the_table_is_recognized_beside_one_with_a_mesh() {
     let mut puck = Mesh::globe(12);
     puck.vertices.iter_mut().for_each(|vertex| *vertex = [25.0 * vertex[0], 25.0 * vertex[1], 8.0 * vertex[2]]);
     let mut puck = Object::new("puck", puck);
     puck.millimeters = Some(1.0);
-    let origin = Origin {
-        touches: 20_000,
-        scene: crate::touches::Surroundings::Table { cone: 0.0 },
-        approaches: true,
-        ..dataset(Vec::new()).origin.unwrap()
-    };
-    let (simulated, _) = crate::capture::in_memory(&[puck], &origin.into(), &()).unwrap();
     let pot = ObjectTouches::new("pot", pressed([0.0; 2], 0.0, 300, ell), Source::Object);
-    let mixed = Dataset { objects: [vec![pot], simulated.objects].concat(), ..dataset(Vec::new()) };
     let settings = Settings::default();
-    let surfaces = learn(&mixed, &settings).unwrap();
-    let model = write(&surfaces, &mixed.names(), &probe(), &settings).unwrap();
+    let standing = standing(&[&puck], &probe(), settings.noise, &()).unwrap();
+    let mut surfaces = cast(&standing, &probe(), &settings).unwrap();
+    surfaces.iter_mut().for_each(|surface| surface.object = 1);
+    surfaces.extend(learn(&dataset(vec![pot]), &settings).unwrap());
+    let model = write(&surfaces, &["pot".into(), "puck".into()], &probe(), &settings).unwrap();
     let maps = Maps::new(&model).unwrap();
     let mut locating = locating(maps, maps.stopping(), None);
     let hand = Hand::of(&maps).unwrap();

@@ -1,5 +1,6 @@
 //! Heights of a placement on a grid.
 
+use super::Lying;
 use super::grid::{count, index, mean, pieces, places};
 
 /// Heights above this are the object's, in millimeters: what is below may be noise on the table.
@@ -33,11 +34,18 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// One with these heights in cells of 1 mm.
-    pub(super) fn of(object: usize, half: [i32; 2], height: impl Fn([i32; 2]) -> f64) -> Self {
+    /// One with these heights, without a name.
+    pub(super) fn of(object: usize, half: [i32; 2], cell: f64, height: impl Fn([i32; 2]) -> f64) -> Self {
         let heights = places(half).map(height).collect();
-        let (placement, share, cell, known, is_round) = (String::new(), 1.0, 1.0, 1.0, false);
+        let (placement, share, known, is_round) = (String::new(), 1.0, 1.0, false);
         Self { object, placement, share, cell, half, heights, known, is_round }
+    }
+
+    /// The heights that a fingertip of this radius meets in the middle of each cell.
+    pub(super) fn cast(lying: &Lying, radius: f64, cell: f64) -> Self {
+        let half = lying.half();
+        let reach = [half.x, half.y].map(|half| ((half + radius) / cell).ceil() as i32 + 1);
+        Self::of(0, reach, cell, |at| lying.height(at.map(|place| f64::from(place) * cell), radius))
     }
 
     /// The height of a cell; 0 outside.
@@ -46,7 +54,7 @@ impl Surface {
     }
 
     /// The height of the cell nearest to a point, in millimeters.
-    fn near(&self, x: f64, y: f64) -> f64 {
+    pub(super) fn near(&self, [x, y]: [f64; 2]) -> f64 {
         self.at((x / self.cell).round() as i32, (y / self.cell).round() as i32)
     }
 
@@ -65,16 +73,29 @@ impl Surface {
         self.heights.iter().copied().fold(0.0, f64::max)
     }
 
-    /// Mean difference of heights from another's that is turned, over the cells of either.
-    pub(super) fn differs(&self, other: &Self, turn: f64) -> f64 {
-        let (sin, cos) = turn.sin_cos();
+    /// The middle of what rises from the table.
+    pub(super) fn middle(&self) -> [f64; 2] {
+        let add =
+            |[u, v, sum]: [f64; 3], ([x, y], height): ([f64; 2], f64)| [u + x * height, v + y * height, sum + height];
+        let [x, y, sum] = self.cells().fold([0.0; 3], add);
+        [x / sum.max(f64::MIN_POSITIVE), y / sum.max(f64::MIN_POSITIVE)]
+    }
+
+    /// Mean difference of heights from others at the same places, where either rises from the table.
+    pub(super) fn off(&self, other: impl Fn([f64; 2]) -> f64) -> f64 {
         let (mut sum, mut count) = (0.0, 0.0_f64);
-        for ([x, y], height) in self.cells() {
-            let turned = other.near(cos * x + sin * y, cos * y - sin * x);
-            sum += (height - turned).abs();
-            count += f64::from(u8::from(height > TABLE || turned > TABLE));
+        for (place, height) in self.cells() {
+            let other = other(place);
+            sum += (height - other).abs();
+            count += f64::from(u8::from(height > TABLE || other > TABLE));
         }
         sum / count.max(1.0)
+    }
+
+    /// Mean difference of heights from another's that is turned.
+    pub(super) fn differs(&self, other: &Self, turn: f64) -> f64 {
+        let (sin, cos) = turn.sin_cos();
+        self.off(|[x, y]| other.near([cos * x + sin * y, cos * y - sin * x]))
     }
 
     /// True if heights depend on the distance from the origin alone.

@@ -1,9 +1,8 @@
 //! Height of the table and offsets of fingertips, from presses on the bare table.
 
 use super::Hand;
-use super::contacts::{Met, heights};
+use super::contacts::{Met, tips};
 use super::error::LocateProblem;
-use super::learn::median;
 use crate::error::{Error, Place, Result};
 use crate::probe::approach::{FINGERS, Probe};
 use nalgebra::{SMatrix, SVector};
@@ -209,6 +208,22 @@ impl BareTable {
             self.noise / speed * 1e3,
         )
     }
+}
+
+/// Heights that the fingers of a touch met; none without a position or pose.
+fn heights(touch: &Touch, probe: &Probe) -> Option<[Option<Met>; FINGERS]> {
+    let (tips, times) = (tips(touch, probe)?, touch.times());
+    Some(std::array::from_fn(|finger| {
+        let micros = times[finger].micros()?;
+        let Met { x, y, height } = tips[finger];
+        Some(Met { x, y, height: height - f64::from(micros) * 1e-6 * probe.speed })
+    }))
+}
+
+fn median(heights: &mut [f64]) -> Option<f64> {
+    heights.sort_unstable_by(f64::total_cmp);
+    let (low, high) = (heights.get(heights.len().checked_sub(1)? / 2)?, heights.get(heights.len() / 2)?);
+    Some((low + high) / 2.0)
 }
 
 #[cfg(test)]

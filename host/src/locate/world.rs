@@ -1,31 +1,55 @@
 //! Objects on a simulated table, pressed by a hand that knows where it is.
 
+use super::Lying;
 use super::error::LocateProblem;
+use super::lying::grouped;
 use crate::capture;
 use crate::error::{Error, Result};
+use crate::in_order::in_order;
 use crate::mesh::Object;
+use crate::mesh::placements::{self, Placement};
 use crate::probe::approach::{FINGERS, Probe, to_q15};
 use crate::probe::noise::{Deviation, Noise};
 use crate::probe::scene::Scene;
-use crate::progress::Progress;
+use crate::progress::{self, Progress};
 use crate::random::{self, Purpose};
-use crate::touches::{Origin, Surroundings};
+use crate::touches::Origin;
 use crate::with;
-use glam::DVec3;
 use palpate_onboard::locate::Approach;
 use palpate_shared::format::Length;
 use palpate_shared::{ContactTime, Pose, Position, Touch};
 use rand::rngs::ChaCha8Rng;
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+use std::sync::Arc;
 
-/// An object on the table: its placements as scenes, and how often it lies in each.
+/// An object on the table, and the poses that it lies in.
 #[derive(Clone, Debug)]
 pub struct Standing {
     /// Name of the object.
     pub name: String,
-    /// Placements, each with its share.
-    pub placements: Vec<(Scene, f64)>,
+    /// Its poses, as they are: also those that look like another one.
+    pub placements: Vec<Lying>,
+    /// Poses that are left out because they are rare, with their shares.
+    pub left_out: Vec<(String, f64)>,
+}
+
+impl Standing {
+    /// An object that lies in these poses.
+    pub fn of(name: &str, placements: Vec<Lying>) -> Self {
+        Self { name: name.into(), placements, left_out: Vec::new() }
+    }
+
+    /// The poses that look different, each with the share of those that look like it.
+    pub fn looks(&self) -> impl Iterator<Item = (&Lying, f64)> {
+        let all: f64 = self.placements.iter().map(|lying| lying.share).sum();
+        let is_first = |(index, lying): &(usize, &Lying)| lying.first == *index;
+        self.placements.iter().enumerate().filter(is_first).map(move |(index, first)| {
+            let alike = self.placements.iter().filter(|lying| lying.first == index);
+            (first, alike.map(|lying| lying.share).sum::<f64>() / all)
+        })
+    }
 }
 
 /// Noise of a hand and of a table.
@@ -158,7 +182,7 @@ pub enum Aimed {
 pub struct Truth {
     /// Position of the object among those that stand.
     pub object: usize,
-    /// Position of its placement.
+    /// Position of its pose.
     pub placement: usize,
     /// Origin in millimeters.
     pub place: [f64; 2],
@@ -166,24 +190,35 @@ pub struct Truth {
     pub yaw: f64,
 }
 
-/// The objects as they lie on a table, at their true size.
+/// The objects as they lie on a table, at their true size: in every pose in which they rest on their hull, or in the placements that an
+/// object states. Poses that look the same to contacts of this noise, a standard deviation in millimeters, are counted together; only
+/// then the rare ones are left out. Cost: some milliseconds for each pose.
 ///
 /// # Errors
 /// A mesh that makes no scene, or whose true size is not known.
-pub fn standing(objects: &[&Object], probe: &Probe, progress: &dyn Progress) -> Result<Vec<Standing>> {
-    let scene = Surroundings::Table { cone: 0.0 };
-    let origin =
-        Origin { scene, unit: Length::Millimeter, probe: *probe, touches: 1, approaches: true, ..Origin::default() };
+pub fn standing(objects: &[&Object], probe: &Probe, noise: f64, progress: &dyn Progress) -> Result<Vec<Standing>> {
+    let origin = Origin { unit: Length::Millimeter, probe: *probe, touches: 1, approaches: true, ..Origin::default() };
     let scenes = capture::scenes(objects, &origin, progress)?;
-    let with_share = |scene: Scene| {
-        let share = scene.table().map_or(1.0, |table| table.weight);
-        (scene, share)
+    progress.begin("placements", Some(objects.len() as u64));
+    let of = |(object, scenes): (&&Object, Vec<Scene>)| -> Result<Standing> {
+        let each = match object.placement_weights.is_empty() {
+            true => object.instances().map(|instance| placements::resting(&instance.mesh)).collect(),
+            false => placements::of_object(object).map(|each| each.into_iter().map(|own| own.placements).collect()),
+        };
+        let each: Vec<Vec<Placement>> = each.map_err(|error| capture::in_object(object, error))?;
+        let has_several = each.len() > 1;
+        let mut poses = Vec::new();
+        for ((instance, scene), own) in object.instances().zip(scenes.into_iter().map(Arc::new)).zip(each) {
+            poses.extend(own.into_iter().map(|Placement { name, weight, rotation }| {
+                let name = if has_several { format!("{} {name}", instance.name) } else { name };
+                Lying::new(Arc::clone(&scene), rotation, name, weight)
+            }));
+        }
+        let (placements, left_out) = grouped(poses, probe.radius, noise);
+        progress::advance(progress, 1)?;
+        Ok(Standing { left_out, ..Standing::of(&object.name, placements) })
     };
-    let of = |(object, scenes): (&&Object, Vec<Scene>)| Standing {
-        name: object.name.clone(),
-        placements: scenes.into_iter().map(with_share).collect(),
-    };
-    Ok(objects.iter().zip(scenes).map(of).collect())
+    in_order(objects.par_iter().zip(scenes).map(of))
 }
 
 /// A table with objects to choose from, and a hand.
@@ -207,9 +242,9 @@ impl<'w> World<'w> {
         let mut random = random::generator(self.seed, Purpose::Table, "", index);
         let object = usize::try_from(index).unwrap_or(0) % self.standing.len().max(1);
         let placements = &self.standing[object].placements;
-        let mut left: f64 = random.random::<f64>() * placements.iter().map(|(_, share)| share).sum::<f64>();
-        let below = |(_, share): &(Scene, f64)| {
-            left -= share;
+        let mut left: f64 = random.random::<f64>() * placements.iter().map(|lying| lying.share).sum::<f64>();
+        let below = |lying: &Lying| {
+            left -= lying.share;
             left < 0.0
         };
         let placement = placements.iter().position(below).unwrap_or(placements.len() - 1);
@@ -240,25 +275,20 @@ impl Drawn<'_> {
     pub fn press(&mut self, at: Approach) -> Touch {
         let World { standing, probe, real, .. } = self.world;
         let Truth { object, placement, place, yaw } = self.truth;
-        let (scene, _) = &standing[object].placements[placement];
-        let [low, high] = scene.bounds();
+        let lying = &standing[object].placements[placement];
         let roll = f64::from(at.roll) / 256.0 * std::f64::consts::TAU;
         let (stated_sin, stated_cos) = roll.sin_cos();
         let (row_sin, row_cos) = (roll + real.turned.to_radians()).sin_cos();
         let stated = [at.x, at.y].map(|micrometers| f64::from(micrometers) / 1_000.0);
         let shift = [0; 3].map(|_| real.position * normal(&mut self.random));
         let (sin, cos) = yaw.sin_cos();
-        // The scene is centered on its box; the table is at its lowest point.
-        let top = high.z - low.z + 2.0 * probe.radius + 1.0;
         let mut heights = [None; FINGERS];
         for (((height, bent), tip), finger) in heights.iter_mut().zip(self.bent).zip(self.tips).zip([-1.0, 0.0, 1.0]) {
             let along = finger * probe.spacing + bent[0];
             let x = stated[0] + shift[0] + along * row_cos - bent[1] * row_sin - place[0];
             let y = stated[1] + shift[1] + along * row_sin + bent[1] * row_cos - place[1];
             let (u, v) = ((cos * x + sin * y) / real.size, (cos * y - sin * x) / real.size);
-            let start = DVec3::new(u, v, low.z + top / real.size);
-            let contact = scene.first_contact(start, DVec3::NEG_Z, probe.radius);
-            let met = contact.map_or(0.0, |way| (top - way * real.size - probe.radius).max(0.0));
+            let met = real.size * lying.height([u, v], probe.radius / real.size);
             let is_lost = self.random.random::<f64>() < real.lost && met > 0.0;
             *height = (!is_lost).then_some(met + real.table + tip + shift[2] + real.height * normal(&mut self.random));
         }

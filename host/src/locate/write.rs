@@ -32,6 +32,7 @@ pub fn write(surfaces: &[Surface], objects: &[String], probe: &Probe, settings: 
             return Err(LocateProblem::NotMet { object: object.clone(), placement: String::new() }.into());
         }
     }
+    let count = u8::try_from(surfaces.len()).map_err(|_| LocateProblem::Placements { found: surfaces.len() })?;
     let (mut records, mut heights) = (Vec::new(), Vec::new());
     for surface in surfaces {
         let offset = u32::try_from(heights.len()).unwrap_or(u32::MAX);
@@ -56,8 +57,7 @@ pub fn write(surfaces: &[Surface], objects: &[String], probe: &Probe, settings: 
         records.extend([0; 2]);
     }
     let number = |number: f64, most: u16| (number.round() as u16).min(most).to_le_bytes();
-    let mut content =
-        vec![if settings.fine { 4 } else { 5 }, settings.roots(), u8::try_from(surfaces.len()).unwrap_or(u8::MAX), 0];
+    let mut content = vec![if settings.fine { 4 } else { 5 }, settings.roots(), count, 0];
     content.extend(number(settings.range * SIXTEENTHS, 4_096));
     content.extend(number(settings.drift * SIXTEENTHS, 1_023));
     content.extend(number(settings.drift_yaw.to_radians() * 16_384.0, 1_023));

@@ -35,14 +35,9 @@ pub struct Origin {
     pub scene: Surroundings,
     /// True if the probe's direction and alignment are written too.
     pub pose: bool,
-    /// True if the hand's position is written too, of approaches straight down to an object of true size on a table: pose and
-    /// position are then in the frame of the placement, whose origin is on the table below the center of its bounding box.
+    /// True for recorded touches that state the hand's position. No simulated ones do.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub position: bool,
-    /// Half the side of the square about the placement's origin in which approaches with a position aim, in millimeters. None:
-    /// within the placement's bounding box and [`BESIDE`](Self::BESIDE) about it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub within: Option<f64>,
     /// True if every approach is kept, not only full touches: sample i is then approach i.
     pub approaches: bool,
     /// The samples that this data set holds, if it is a part of them all.
@@ -65,7 +60,6 @@ impl Default for Origin {
             scene: Surroundings::Floating,
             pose: false,
             position: false,
-            within: None,
             approaches: false,
             samples: None,
             real: Noise::default(),
@@ -74,9 +68,6 @@ impl Default for Origin {
 }
 
 impl Origin {
-    /// Distance by which approaches with a position aim beside the bounding box at most, in millimeters.
-    pub const BESIDE: f64 = 5.0;
-
     /// Origin of recorded touches: every touch with a contact is kept, nothing is drawn.
     pub fn recorded(probe: Probe, unit: Length, pose: bool) -> Self {
         Self { touches: 0, seed: 0, probe, unit, pose, approaches: true, ..Self::default() }
@@ -96,51 +87,14 @@ impl Origin {
             return Err(Error::setting("samples", samples, allowed));
         }
         self.real.check()?;
-        self.check_position()?;
+        if self.position {
+            return Err(Error::setting("position", true, "false: maps of meshes are cast, without touches"));
+        }
+        self.scene.check()?;
         match self.unit {
             Length::Tenth => self.probe.check(self.length),
             // Each object is checked when its size is known.
             Length::Millimeter => self.probe.check(1.0),
-        }
-    }
-
-    fn check_position(&self) -> Result<()> {
-        if !self.position {
-            return match self.within {
-                Some(within) => Err(Error::setting("within", within, "it with --position")),
-                None => self.scene.check(),
-            };
-        }
-        match self.scene.cone() {
-            None => return Err(Error::setting("scene", self.scene, "table with --position")),
-            Some(0.0) => {}
-            Some(cone) => {
-                let allowed = "0 with --position, whose approaches come straight down";
-                return Err(Error::setting("cone", cone, allowed));
-            }
-        }
-        if self.unit != Length::Millimeter {
-            return Err(Error::setting("true_size", "not given", "it with --position"));
-        }
-        if !self.aim.is_box() {
-            return Err(Error::setting("aim", self.aim.name(), "--within MM with --position"));
-        }
-        if !(self.pose && self.approaches) {
-            let name = if self.pose { "approaches" } else { "pose" };
-            return Err(Error::setting(name, "false", "it with --position, which keeps the pose of every approach"));
-        }
-        match self.within.filter(|within| !(within.is_finite() && *within >= 0.0)) {
-            Some(within) => Err(Error::setting("within", within, "a length of at least 0 in millimeters")),
-            None => Ok(()),
-        }
-    }
-
-    /// The region in which approaches with a position aim, in the frame of the placement with this bounding box: its lowest and
-    /// its highest x and y.
-    pub(crate) fn region(&self, [low, high]: [DVec3; 2]) -> [[f64; 2]; 2] {
-        match self.within {
-            Some(within) => [[-within; 2], [within; 2]],
-            None => [[low.x, low.y].map(|side| side - Self::BESIDE), [high.x, high.y].map(|side| side + Self::BESIDE)],
         }
     }
 

@@ -14,7 +14,7 @@ pub(crate) use palpate::probe::noise::Noise;
 pub(crate) use palpate::random::{Purpose, generator};
 pub(crate) use palpate::shared::format::{Counted, Length, Per};
 pub(crate) use palpate::shared::{ContactTime, Descriptor, Pose, Q15_ONE, Touch};
-pub(crate) use palpate::touches::{Dataset, ObjectTouches, Origin, Recorded, Source, Surroundings};
+pub(crate) use palpate::touches::{Dataset, ObjectTouches, Origin, Recorded, Source};
 pub(crate) use palpate::with;
 pub(crate) use std::collections::BTreeMap;
 pub(crate) use std::path::Path;

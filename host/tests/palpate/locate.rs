@@ -2,9 +2,8 @@
 
 use crate::fixtures::*;
 use palpate::calibrate as promises;
-use palpate::capture;
 use palpate::locate::{
-    Aimed, Approach, Maps, Real, Settings, Standing, TOUCHES, Terms, Until, World, calibrate, evaluate, learn,
+    Aimed, Approach, Maps, Real, Settings, Standing, TOUCHES, Terms, Until, World, calibrate, cast, evaluate, learn,
     locating, standing, write,
 };
 use palpate::onboard::locate::{Contact, Seen};
@@ -35,33 +34,25 @@ fn sized(name: &str, mesh: Mesh) -> Object {
     object
 }
 
-fn touched(objects: &[Object], touches: u64) -> Dataset {
-    let origin = Origin {
-        touches,
-        probe: probe(),
-        unit: Length::Millimeter,
-        scene: Surroundings::Table { cone: 0.0 },
-        position: true,
-        pose: true,
-        approaches: true,
-        ..Origin::default()
-    };
-    capture::in_memory(objects, &origin.into(), &()).unwrap().0
+/// The objects as they stand.
+static STANDING: LazyLock<Vec<Standing>> = LazyLock::new(|| stands(&objects()));
+
+fn stands(objects: &[Object]) -> Vec<Standing> {
+    standing(&objects.iter().collect::<Vec<_>>(), &probe(), 0.5, &()).unwrap()
 }
 
-/// The objects, touched.
-static TOUCHED: LazyLock<Dataset> = LazyLock::new(|| touched(&objects(), 60_000));
+fn names(standing: &[Standing]) -> Vec<String> {
+    standing.iter().map(|object| object.name.clone()).collect()
+}
 
 fn model(settings: &Settings) -> Vec<u8> {
-    write(&learn(&TOUCHED, settings).unwrap(), &TOUCHED.names(), &probe(), settings).unwrap()
+    write(&cast(&STANDING, &probe(), settings).unwrap(), &names(&STANDING), &probe(), settings).unwrap()
 }
 
 /// Maps with the usual settings.
 static MODEL: LazyLock<Vec<u8>> = LazyLock::new(|| model(&Settings::default()));
 /// Coarser ones.
 static COARSE: LazyLock<Vec<u8>> = LazyLock::new(|| model(&with!(Settings::default(), fine = false)));
-/// The objects as they stand.
-static STANDING: LazyLock<Vec<Standing>> = LazyLock::new(|| standing(&objects().each_ref(), &probe(), &()).unwrap());
 
 fn terms(sequences: usize) -> Terms {
     Terms {
@@ -218,14 +209,14 @@ fn going_on_until_the_place_changes_no_name() {
 #[test]
 fn an_object_that_the_model_does_not_know_is_called_unknown() {
     let mut objects = objects().to_vec();
-    let known = standing(&objects.iter().collect::<Vec<_>>(), &probe(), &()).unwrap();
+    let known = stands(&objects);
     let terms = Terms { unknown: true, ..terms(80) };
     let calibrated = calibrate(Maps::new(&MODEL).unwrap(), &known, &probe(), &terms, &()).unwrap();
     // As high as three pucks.
     let mut tower = objects[1].mesh().clone();
     tower.vertices.iter_mut().for_each(|vertex| *vertex = [vertex[0] * 0.7, vertex[1] * 0.7, vertex[2] * 5.0]);
     objects.push(sized("tower", tower));
-    let all = standing(&objects.iter().collect::<Vec<_>>(), &probe(), &()).unwrap();
+    let all = stands(&objects);
     let found =
         evaluate(Maps::new(&calibrated.model).unwrap(), &all, &probe(), &Terms { seed: 9, ..terms }, &()).unwrap();
     let unknown: Vec<usize> = found.objects.iter().map(|object| object.unknown).collect();
@@ -234,11 +225,12 @@ fn an_object_that_the_model_does_not_know_is_called_unknown() {
 
 #[test]
 fn touches_without_a_position_and_other_units_are_refused() {
-    let mut dataset = touched(&objects(), 50);
-    let touch = dataset.objects[0].touches()[0];
+    let world = World { standing: &STANDING, probe: &probe(), real: Real::default(), range: 28.0, seed: 3 };
+    let touch = world.draw(0).press(Approach::default());
     let bare = Touch::new(touch.times()).with_pose(touch.pose().unwrap());
     let object = ObjectTouches::new("bar", vec![touch, bare], Source::Object);
-    dataset.objects = vec![object];
+    let origin = Origin { probe: probe(), unit: Length::Millimeter, ..Origin::default() };
+    let mut dataset = Dataset { origin: Some(origin), ..Dataset::new(vec![object]) };
     let error = learn(&dataset, &Settings::default()).unwrap_err().to_string();
     assert!(error.contains("bar: touch 2 has no position"), "{error}");
     dataset.origin = None;
@@ -251,7 +243,7 @@ fn maps_of_no_object_and_of_one_without_a_surface_are_refused_by_name() {
     let settings = Settings::default();
     let error = write(&[], &[], &probe(), &settings).unwrap_err().to_string();
     assert!(error.contains("no objects"), "{error}");
-    let surfaces = learn(&touched(&objects(), 2_000), &settings).unwrap();
+    let surfaces = cast(&STANDING, &probe(), &settings).unwrap();
     let names = ["bar", "puck", "cup"].map(String::from);
     let error = write(&surfaces, &names, &probe(), &settings).unwrap_err().to_string();
     assert!(error.contains("cup: no touch met it"), "{error}");
@@ -269,4 +261,139 @@ fn settings_out_of_range_are_refused_by_name() {
         let error = wrong.check().unwrap_err().to_string();
         assert!(error.starts_with(name), "{error}");
     }
+}
+
+/// A solid of revolution about z of this many sides: radii at heights, from below, in millimeters.
+fn turned(name: &str, sides: u32, profile: &[[f32; 2]]) -> Object {
+    let ring = |&[radius, height]: &[f32; 2]| {
+        (0..sides).map(move |side| {
+            let (sin, cos) = (std::f32::consts::TAU * side as f32 / sides as f32).sin_cos();
+            [radius * cos, radius * sin, height]
+        })
+    };
+    let ends = [profile[0], profile[profile.len() - 1]].map(|[_, height]| [0.0, 0.0, height]);
+    let vertices: Vec<[f32; 3]> = profile.iter().flat_map(ring).chain(ends).collect();
+    let (rings, first) = (profile.len() as u32, vertices.len() as u32 - 2);
+    let mut triangles = Vec::new();
+    for side in 0..sides {
+        let next = (side + 1) % sides;
+        for below in (0..rings - 1).map(|ring| ring * sides) {
+            let above = below + sides;
+            triangles.extend([[below + side, below + next, above + next], [below + side, above + next, above + side]]);
+        }
+        let top = (rings - 1) * sides;
+        triangles.extend([[next, side, first], [top + side, top + next, first + 1]]);
+    }
+    sized(name, Mesh { vertices, triangles })
+}
+
+#[test]
+fn poses_on_many_facets_have_one_map_and_none_is_lost_since_each_is_rare() {
+    let barrel = turned("barrel", 64, &[[24.0, 0.0], [30.0, 25.0], [30.0, 55.0], [24.0, 80.0]]);
+    let bottle = turned("bottle", 64, &[[30.0, 0.0], [30.0, 55.0], [11.0, 75.0], [11.0, 100.0]]);
+    for object in [barrel, bottle] {
+        let standing = stands(std::slice::from_ref(&object));
+        let lying: Vec<f64> =
+            standing[0].placements.iter().map(|lying| lying.share).filter(|share| *share < 0.03).collect();
+        assert!(lying.len() >= 64 && lying[..64].iter().all(|share| *share > 0.009), "{lying:?}");
+        let looks: Vec<(&str, f64)> = standing[0].looks().map(|(lying, share)| (lying.name.as_str(), share)).collect();
+        assert!((2..=3).contains(&looks.len()) && looks[0].1 > 0.6, "{} {looks:?}", object.name);
+        assert!((looks.iter().map(|(_, share)| share).sum::<f64>() - 1.0).abs() < 1e-9);
+        let of_trees = palpate::mesh::placements::placements(object.mesh()).unwrap().placements;
+        assert_eq!(looks[0].0, of_trees[0].name);
+        let maps = cast(&standing, &probe(), &Settings::default()).unwrap();
+        assert_eq!(maps.len(), looks.len());
+        // What is played is each facet as it is, and it is found.
+        let names = names(&standing);
+        let bytes = write(&maps, &names, &probe(), &Settings::default()).unwrap();
+        let until = Some(Until { millimeters: 6.0, degrees: 10.0 });
+        let found =
+            evaluate(Maps::new(&bytes).unwrap(), &standing, &probe(), &Terms { until, ..terms(20) }, &()).unwrap();
+        assert!(found.wrong == 0 && found.poses_within + 2 >= found.poses && found.poses >= 15, "{found:?}");
+    }
+}
+
+#[test]
+fn poses_are_one_where_their_surfaces_agree_to_the_noise_that_is_stated() {
+    // Two ends that differ by a few millimeters of their rim.
+    let spool = turned("spool", 48, &[[26.0, 0.0], [26.0, 12.0], [27.5, 24.0]]);
+    let count = |noise| standing(&[&spool], &probe(), noise, &()).unwrap()[0].looks().count();
+    assert!(count(0.1) > count(3.0), "{} {}", count(0.1), count(3.0));
+    // Whatever is stated, what differs by less than .2 mm is one.
+    let cylinder = turned("cylinder", 48, &[[26.0, 0.0], [26.02, 24.0]]);
+    assert_eq!(standing(&[&cylinder], &probe(), 0.01, &()).unwrap()[0].looks().count(), 2);
+}
+
+#[test]
+fn a_symmetric_object_without_a_middle_of_its_box_lies_in_one_way() {
+    let corners = [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0_f32]];
+    let vertices = corners.map(|corner| corner.map(|axis| 30.0 * axis)).to_vec();
+    let object = sized("tetrahedron", Mesh { vertices, triangles: vec![[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]] });
+    let standing = stands(&[object]);
+    assert_eq!((standing[0].placements.len(), standing[0].looks().count()), (4, 1));
+}
+
+#[test]
+fn maps_of_meshes_are_the_same_on_any_number_of_threads() {
+    let maps = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| cast(&stands(&objects()), &probe(), &Settings::default()).unwrap())
+    };
+    let [one, four] = [1, 4].map(|threads| format!("{:?}", maps(threads)));
+    assert!(one == four);
+}
+
+#[test]
+fn a_map_has_what_a_fingertip_meets_in_the_middle_of_each_cell() {
+    let disc = turned("disc", 90, &[[20.0, 0.0], [20.0, 10.0]]);
+    let standing = stands(&[disc]);
+    let maps = cast(&standing, &probe(), &Settings::default()).unwrap();
+    let flat = maps.iter().find(|surface| surface.is_round).unwrap();
+    let height = |i: i32, j: i32| {
+        let [x, y] = flat.half;
+        flat.heights[((j + y) * (2 * x + 1) + i + x) as usize]
+    };
+    assert!((height(0, 0) - 10.0).abs() < 1e-6 && (height(13, 13) - 10.0).abs() < 1e-6);
+    // The ball's side is at the rim 1 mm beside it.
+    assert!((height(21, 0) - (10.0 - 1.5 + 1.25_f64.sqrt())).abs() < 0.05, "{}", height(21, 0));
+    assert_eq!((height(22, 0), flat.known), (0.0, 1.0));
+}
+
+#[test]
+fn an_object_that_is_too_large_or_too_flat_for_a_map_is_named() {
+    for (half, expected) in [([600.0, 600.0, 50.0], "slab: it is too large for a map"), ([40.0, 30.0, 0.1], "slab: ")] {
+        let mut mesh = Mesh::globe(4);
+        mesh.vertices.iter_mut().for_each(|vertex| *vertex = [0, 1, 2].map(|axis| half[axis] * vertex[axis]));
+        let standing = stands(&[sized("slab", mesh)]);
+        let error = cast(&standing, &probe(), &Settings::default()).unwrap_err().to_string();
+        assert!(error.starts_with(expected), "{error}");
+    }
+}
+
+#[test]
+fn all_poses_of_a_mouse_on_its_back_have_a_map() {
+    let Some(mesh) = std::env::var_os("PALPATE_SHARED").map(|shared| Path::new(&shared).join("objects/mouse.obj"))
+    else {
+        eprintln!("skipped: PALPATE_SHARED is not set");
+        return;
+    };
+    if !mesh.exists() {
+        eprintln!("skipped: {} is not there", mesh.display());
+        return;
+    }
+    let mut mouse = palpate::mesh::source::object(mesh.to_str().unwrap()).unwrap();
+    mouse.millimeters = Some(1.0);
+    let longest = mouse.true_length(mouse.first()).unwrap();
+    mouse.millimeters = Some(100.0 / longest);
+    let standing = stands(&[mouse]);
+    let back: Vec<(&str, f64)> = standing[0]
+        .looks()
+        .filter(|(lying, _)| lying.name.starts_with("-y"))
+        .map(|(lying, share)| (lying.name.as_str(), share))
+        .collect();
+    assert_eq!(back.len(), 4, "{back:?}");
+    assert!(back.iter().all(|(_, share)| *share > 0.08), "{back:?}");
+    let maps = cast(&standing, &probe(), &Settings::default()).unwrap();
+    let has_map = |name: &str| maps.iter().any(|surface| surface.placement == name);
+    assert!(back.iter().all(|(name, _)| has_map(name)));
 }

@@ -2,12 +2,13 @@
 
 use crate::table::{Table, index};
 use palpate::glam::{DMat3, DVec3};
-use palpate::locate::{Approach, Maps, Real, Standing, World};
+use palpate::locate::{Approach, Lying, Maps, Real, Standing, World};
 use palpate::onboard::Verdict;
 use palpate::play::{Hidden, decompress};
 use palpate::probe::Probe;
-use palpate::probe::scene;
+use palpate::probe::Scene;
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 impl Table {
     pub(crate) fn lay(&mut self, object: u32, weight: f64) -> Option<usize> {
@@ -17,16 +18,15 @@ impl Table {
         let rotation = DMat3::from_cols_slice(&numbers);
         let placement = String::from_utf8(name.to_vec()).ok()?;
         let (mesh, length) = (self.meshes.get(object)?, *self.lengths.get(object)?);
-        let table = scene::Table { instance: 0, placement, weight, cone: 0.0 };
-        let scene = scene::Scene::on_table(mesh, length, rotation, table).ok()?;
+        let lying = Lying::new(Arc::new(Scene::new(mesh, length).ok()?), rotation, placement, weight);
         let [from, to] = mesh.bounds().map(|corner| corner.as_dvec3());
         let scale = length / (to - from).max_element();
         let exact = |vertex: &[f32; 3]| DVec3::from(vertex.map(f64::from));
         let turned = |vertex: &[f32; 3]| rotation * (exact(vertex) - (from + to) / 2.0) * scale;
         let placed: Vec<_> = mesh.vertices.iter().map(turned).collect();
         let low = placed.iter().copied().reduce(|low, at| low.min(at))?;
-        let [corner, _] = scene.bounds();
-        // The scene is centered on its box; its lowest point is on the table.
+        // The middle of its box is over the origin, its lowest point on the table.
+        let corner = -lying.half();
         self.output = placed
             .iter()
             .flat_map(|at| {
@@ -34,7 +34,7 @@ impl Table {
                 [x, y, at.z - low.z]
             })
             .collect();
-        self.press.standing.get_mut(object)?.placements.push((scene, weight));
+        self.press.standing.get_mut(object)?.placements.push(lying);
         Some(self.output.len())
     }
 
@@ -92,8 +92,7 @@ impl Table {
             let pose = &ghost.pose;
             let name = maps.placement_name(pose.placement);
             let placements = &world.standing.get(ghost.object)?.placements;
-            let lies = |(scene, _): &(scene::Scene, f64)| scene.table().is_some_and(|table| table.placement == name);
-            let placement = placements.iter().position(lies)?;
+            let placement = placements.iter().position(|lying| lying.name == name)?;
             let [x, y] = pose.position.map(|micrometers| f64::from(micrometers) / 1e3);
             let [within_x, within_y] = pose.within.map(|micrometers| f64::from(micrometers) / 1e3);
             let radians = |turn: u16| f64::from(turn) / 65_536.0 * TAU;

@@ -79,7 +79,7 @@ impl Table {
         let object = self.game.as_mut()?.add_object(name, &mesh, length).ok()?;
         self.meshes.push(mesh);
         self.lengths.push(length);
-        self.press.standing.push(Standing { name: name.into(), placements: Vec::new() });
+        self.press.standing.push(Standing::of(name, Vec::new()));
         Some(object)
     }
 

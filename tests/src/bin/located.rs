@@ -8,7 +8,7 @@
 
 use palpate::calibrate;
 use palpate::locate::{
-    self, Aimed, Approach, Effort, Hand, Maps, Real, Settings, Shape, Standing, Truth, Until, World,
+    self, Aimed, Approach, Effort, Hand, Maps, Real, Settings, Shape, Standing, Surface, Truth, Until, World,
 };
 use palpate::mesh::Object;
 use palpate::probe::approach::Probe;
@@ -49,34 +49,37 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut standing: Vec<Standing> = Vec::new();
     for size in &sizes {
         let objects = meshes(&folder, 100.0 * size)?;
-        let more = locate::standing(&objects.iter().collect::<Vec<_>>(), &probe, &())?;
+        let more = locate::standing(&objects.iter().collect::<Vec<_>>(), &probe, base.number("noise", 0.5), &())?;
         standing.extend(more.into_iter().map(|object| Standing {
             name: if sizes.len() > 1 { format!("{} {size}", object.name) } else { object.name },
             ..object
         }));
     }
     standing.sort_by(|a, b| a.name.cmp(&b.name));
-    // Objects that have no mesh: each is explored in its most likely placement, and stands in no other.
+    // Objects that have no mesh: each is explored in its most likely pose, and stands in no other.
     let explored = base.0.get("explored").cloned().unwrap_or_default();
     let is_explored = |name: &str| explored.split(',').any(|own| own == name);
     for object in standing.iter_mut().filter(|object| is_explored(&object.name)) {
-        object.placements.sort_by(|one, other| other.1.total_cmp(&one.1));
         object.placements.truncate(1);
     }
     // Objects that the model does not know.
     let unknown = base.0.get("unknown").cloned().unwrap_or_default();
     let known: Vec<Standing> =
         standing.iter().filter(|object| !unknown.split(',').any(|name| name == object.name)).cloned().collect();
-    let mut dataset = taught(&known, &probe, base.number("touches", 20_000.0) as u64);
-    for (object, stands) in known.iter().enumerate().filter(|(_, stands)| is_explored(&stands.name)) {
-        let touches = explore(&known, object, &probe, base.number("teaching", 300.0) as usize);
-        dataset.objects[object] = ObjectTouches::new(stands.name.clone(), touches, Source::Object);
-    }
+    let touches = |(object, stands): (usize, &Standing)| {
+        let touches = match is_explored(&stands.name) {
+            true => explore(&known, object, &probe, base.number("teaching", 300.0) as usize),
+            false => Vec::new(),
+        };
+        ObjectTouches::new(stands.name.clone(), touches, Source::Object)
+    };
+    let origin = Origin { unit: Length::Millimeter, probe, pose: true, position: true, ..Origin::default() };
+    let dataset = Dataset { origin: Some(origin), ..Dataset::new(known.iter().enumerate().map(touches).collect()) };
     eprintln!("touches {:.1} s", began.elapsed().as_secs_f64());
     let mut model = Vec::new();
     for given in &runs {
         if given.number("keep", 0.0) == 0.0 {
-            model = learned(given, &dataset, &probe)?;
+            model = learned(given, &known, &dataset, &probe)?;
         }
         run(given, &mut model, [&standing, &known], &probe)?;
     }
@@ -99,7 +102,8 @@ fn real(given: &Given) -> Real {
     }
 }
 
-fn learned(given: &Given, dataset: &Dataset, probe: &Probe) -> Result<Vec<u8>, Box<dyn Error>> {
+/// The model, cast at objects without touches, and learned of the others.
+fn learned(given: &Given, known: &[Standing], touched: &Dataset, probe: &Probe) -> Result<Vec<u8>, Box<dyn Error>> {
     let (number, real) = (|key: &str, default: f64| given.number(key, default), real(given));
     let settings = with!(
         Settings::default(),
@@ -113,16 +117,23 @@ fn learned(given: &Given, dataset: &Dataset, probe: &Probe) -> Result<Vec<u8>, B
         drift_yaw = number("stated_drift", real.drift),
         error_rate = 1.0 - number("threshold", 0.99)
     );
-    let surfaces = locate::learn(dataset, &settings)?;
+    let mut surfaces = Vec::new();
+    for (object, own) in touched.objects.iter().enumerate() {
+        let made = match own.is_empty() {
+            true => locate::cast(&known[object..=object], probe, &settings)?,
+            false => locate::learn(&Dataset { objects: vec![own.clone()], ..touched.clone() }, &settings)?,
+        };
+        surfaces.extend(made.into_iter().map(|surface| Surface { object, ..surface }));
+    }
     if number("v", 0.0) > 0.0 {
         for surface in &surfaces {
-            let name = &dataset.objects[surface.object].name;
+            let name = &known[surface.object].name;
             let (placement, share, half) = (&surface.placement, surface.share, surface.half);
             let (known, is_round) = (surface.known, surface.is_round);
             println!("{name} {placement} share {share:.3} half {half:?} known {known:.2} round {is_round}");
         }
     }
-    let names: Vec<String> = dataset.names();
+    let names: Vec<String> = known.iter().map(|object| object.name.clone()).collect();
     let model = locate::write(&surfaces, &names, probe, &settings)?;
     eprintln!("maps: {} placements, {} bytes", surfaces.len(), model.len());
     Ok(model)
@@ -260,8 +271,7 @@ fn meshes(folder: &str, longest: f64) -> Result<Vec<Object>, Box<dyn Error>> {
 fn explore(standing: &[Standing], object: usize, probe: &Probe, touches: usize) -> Vec<palpate::shared::Touch> {
     let real = Real { lost: 0.0, ..Real::default() };
     let world = World { standing, probe, real, range: 0.0, seed: 78 };
-    let (scene, _) = &standing[object].placements[0];
-    let [_, high] = scene.bounds();
+    let high = standing[object].placements[0].half();
     let mut drawn = world.draw(object as u64).at(Truth { object, placement: 0, place: [0.0; 2], yaw: 0.0 });
     let mut shape = Shape::within(probe, [high.x + 5.0, high.y + 5.0], real.height);
     let mut all = Vec::new();
@@ -273,44 +283,4 @@ fn explore(standing: &[Standing], object: usize, probe: &Probe, touches: usize) 
         all.push(touch);
     }
     all
-}
-
-/// Touches of each placement, at random about its box.
-fn taught(standing: &[Standing], probe: &Probe, touches: u64) -> Dataset {
-    let real = Real { lost: 0.0, height: 0.2, ..Real::default() };
-    let world = World { standing, probe, real, range: 0.0, seed: 77 };
-    let of = |(object, stands): (usize, &Standing)| {
-        let mut drawn: Vec<_> = (0..stands.placements.len())
-            .map(|placement| {
-                world.draw(object as u64 * 1_000 + placement as u64).at(Truth {
-                    object,
-                    placement,
-                    place: [0.0; 2],
-                    yaw: 0.0,
-                })
-            })
-            .collect();
-        let sources: Vec<Source> = (0..)
-            .zip(&stands.placements)
-            .map(|(number, (scene, share)): (i32, _)| Source::Placement {
-                instance: None,
-                placement: scene.table().map_or(number.to_string(), |table| table.placement.clone()),
-                millionths: (share * 1e6) as u32,
-            })
-            .collect();
-        let mut all = Vec::new();
-        for _ in 0..touches {
-            for (drawn, (scene, _)) in drawn.iter_mut().zip(&stands.placements) {
-                let [low, high] = scene.bounds();
-                let reach = (high - low) / 2.0 + 5.0;
-                let at = drawn.anywhere([0.0; 2], 1.0);
-                let scaled = |micrometers: i32, reach: f64| (f64::from(micrometers) * reach) as i32;
-                all.push(drawn.press(Approach { x: scaled(at.x, reach.x), y: scaled(at.y, reach.y), ..at }));
-            }
-        }
-        ObjectTouches::in_turn(stands.name.clone(), all, &sources, 0)
-    };
-    let objects = standing.iter().enumerate().map(of).collect();
-    let origin = Origin { unit: Length::Millimeter, probe: *probe, pose: true, approaches: true, ..Origin::default() };
-    Dataset { origin: Some(origin), ..Dataset::new(objects) }
 }

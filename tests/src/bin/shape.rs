@@ -5,10 +5,8 @@
 //! Each object stands in its most likely placement and is touched at random in its box and 5 mm about it, and where the map is least
 //! known. `write=DIRECTORY` writes the samples and the truth, for docs/measurements/tables/shape.py.
 
-use palpate::glam::DVec3;
-use palpate::locate::{self, Real, Relief, Shape, Standing, Truth, World};
+use palpate::locate::{self, Lying, Real, Relief, Shape, Standing, Truth, World};
 use palpate::probe::approach::Probe;
-use palpate::probe::scene::Scene;
 use palpate::with;
 use std::collections::HashMap;
 use std::error::Error;
@@ -16,25 +14,17 @@ use std::error::Error;
 /// Numbers of approaches after which the map is compared.
 const AFTER: [usize; 4] = [50, 100, 200, 300];
 
-/// An object in its placement, and its true heights.
+/// An object in its pose, and its true heights.
 struct Thing {
-    scene: Scene,
-    probe: Probe,
+    lying: Lying,
+    radius: f64,
     half: [f64; 2],
 }
 
 impl Thing {
-    /// Height that a fingertip meets.
-    fn height(&self, [x, y]: [f64; 2]) -> f64 {
-        let [low, high] = self.scene.bounds();
-        let start = high.z + 2.0 * self.probe.radius;
-        let way = self.scene.first_contact(DVec3::new(x, y, start), DVec3::NEG_Z, self.probe.radius);
-        way.map_or(0.0, |way| (start - way - self.probe.radius - low.z).max(0.0))
-    }
-
     fn truth(&self, relief: &Relief) -> Vec<f64> {
         let [x, y] = relief.half;
-        (-y..=y).flat_map(|j| (-x..=x).map(move |i| self.height([i, j].map(f64::from)))).collect()
+        (-y..=y).flat_map(|j| (-x..=x).map(move |i| self.lying.height([i, j].map(f64::from), self.radius))).collect()
     }
 }
 
@@ -71,7 +61,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let length = object.instances().filter_map(|instance| object.true_length(instance)).fold(0.0, f64::max);
         object.millimeters = Some(100.0 / length);
     }
-    let standing = locate::standing(&objects.iter().collect::<Vec<_>>(), &probe, &())?;
+    let standing = locate::standing(&objects.iter().collect::<Vec<_>>(), &probe, number("noise", 0.5), &())?;
     let real = Real { height: number("noise", 0.5), lost: number("lost", 0.0), ..Real::default() };
     println!("| object | aims | approaches | error, mm | IoU | intervals that hold the truth | their width, mm |");
     println!("|---|---|---|---|---|---|---|");
@@ -110,13 +100,12 @@ fn touched(
     explored: bool,
     write: Option<&String>,
 ) -> Result<Vec<[f64; 4]>, Box<dyn Error>> {
-    let Standing { name, placements } = &world.standing[object];
-    let by_share = |one: &&(Scene, f64), other: &&(Scene, f64)| one.1.total_cmp(&other.1);
-    let (scene, _) = placements.iter().max_by(by_share).ok_or("no placement")?;
-    let placement = placements.iter().position(|(own, _)| std::ptr::eq(own, scene)).unwrap_or(0);
-    let [_, high] = scene.bounds();
-    let thing = Thing { scene: scene.clone(), probe: *world.probe, half: [high.x + 5.0, high.y + 5.0] };
-    let mut drawn = world.draw(object as u64).at(Truth { object, placement, place: [0.0; 2], yaw: 0.0 });
+    let Standing { name, placements, .. } = &world.standing[object];
+    // What it looks like most often comes first.
+    let lying = placements.first().ok_or("no placement")?;
+    let high = lying.half();
+    let thing = Thing { lying: lying.clone(), radius: world.probe.radius, half: [high.x + 5.0, high.y + 5.0] };
+    let mut drawn = world.draw(object as u64).at(Truth { object, placement: 0, place: [0.0; 2], yaw: 0.0 });
     let mut shape = Shape::within(world.probe, thing.half, world.real.height);
     let mut relief = shape.relief();
     let truth = thing.truth(&relief);

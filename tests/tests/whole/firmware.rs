@@ -6,13 +6,13 @@
 
 use palpate::chip::{Asks, Connection, Emulator, Port, Steps, Summary, Transport, Update, stream};
 use palpate::compile::Leaf;
+use palpate::locate::{self, Real, World};
 use palpate::mesh::builtin;
 use palpate::probe::approach::Probe;
-use palpate::touches::{Dataset, ObjectTouches, Origin, Source, Surroundings};
+use palpate::touches::{Dataset, ObjectTouches, Source};
 use palpate::with;
-use palpate::{capture, locate};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
-use palpate_shared::format::{Counted, Length, Trained, TrainedTouches};
+use palpate_shared::format::{Counted, Trained, TrainedTouches};
 use palpate_shared::link::{
     Answer, Decision, Decoder, Detail, Event, FRAME_MAX, FaultKind, Frame, HostSettings, Message, Request,
     TouchMessage, VerdictMessage, encode,
@@ -152,20 +152,21 @@ fn touches_with_a_position_give_the_hosts_verdicts_places_and_approaches_over_a_
     let probe = with!(Probe::default(), radius = 1.5, spacing = 15.0, speed = 100.0, tilt = 0.0, stroke = Some(20.0));
     let mut objects = builtin::make(&["bowl", "camera", "mouse"], None).unwrap();
     objects.iter_mut().for_each(|object| object.millimeters = Some(4.0));
-    let origin = Origin {
-        touches: 8_000,
-        probe,
-        unit: Length::Millimeter,
-        scene: Surroundings::Table { cone: 0.0 },
-        position: true,
-        pose: true,
-        approaches: true,
-        ..Origin::default()
-    };
-    let dataset = capture::in_memory(&objects, &origin.into(), &()).unwrap().0;
     let settings = with!(locate::Settings::default(), fine = false);
-    let surfaces = locate::learn(&dataset, &settings).unwrap();
-    let model = locate::write(&surfaces, &dataset.names(), &probe, &settings).unwrap();
+    let standing = locate::standing(&objects.iter().collect::<Vec<_>>(), &probe, settings.noise, &()).unwrap();
+    let surfaces = locate::cast(&standing, &probe, &settings).unwrap();
+    let names: Vec<String> = standing.iter().map(|object| object.name.clone()).collect();
+    let model = locate::write(&surfaces, &names, &probe, &settings).unwrap();
+    let world = World { standing: &standing, probe: &probe, real: Real::default(), range: 28.0, seed: 1 };
+    let touches = |object: usize| {
+        let mut drawn = world.draw(object as u64);
+        let touches = (0..200).map(|_| {
+            let at = drawn.anywhere(drawn.truth.place, 30.0);
+            drawn.press(at)
+        });
+        ObjectTouches::new(names[object].clone(), touches.collect(), Source::Object)
+    };
+    let dataset = Dataset::new((0..names.len()).map(touches).collect());
     for (faults, settings, touches) in [(None, PATIENT, 100), (Some(BAD), BRISK, 40)] {
         let (transport, _emulator) = started(build("uart", M4F, &["--features", "locate"], None), faults);
         let mut connection = Connection::open(transport, settings).unwrap();

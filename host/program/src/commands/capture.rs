@@ -5,8 +5,8 @@ use super::scene::{SceneArguments, described};
 use super::{Global, remark};
 use palpate::capture::{self, Settings, Summary};
 use palpate::error::Kind;
-use palpate::mesh::BACKGROUND;
 use palpate::mesh::facts::Facts;
+use palpate::mesh::{BACKGROUND, Object};
 use palpate::output;
 use palpate::probe::approach::Aim;
 use palpate::touches::{Origin, Samples};
@@ -29,8 +29,6 @@ Examples:
                                                    as large as they are
   palpate capture meshes/ -o data --instances      a directory for each object
   palpate capture meshes/ -o data --scene table    as they lie, from above
-  palpate capture meshes/ -o data --scene table --position --probe probe.toml
-                                                   and where the hand was
   palpate capture meshes/ -o part2 --samples 7000..14000
                                                    the second of three parts")]
 pub(crate) struct Arguments {
@@ -59,22 +57,13 @@ pub(crate) struct Arguments {
     /// With the probe's direction and alignment
     #[arg(long)]
     pose: bool,
-    /// With the hand's position, in the table's frame; approaches come straight down, and all are kept, at true size
-    #[arg(long)]
-    position: bool,
-    /// With --position: aims at most so far from the object's middle in x and y [default: its box and 5 mm about it]
-    #[arg(long, value_name = "MM")]
-    within: Option<f64>,
     /// Capture only these of each object's touches or approaches; the files of all parts, one after the other, are the whole's
     #[arg(long, value_name = "A..B", value_parser = parsed::<Samples>)]
     samples: Option<Samples>,
 }
 
-pub(crate) fn run(mut arguments: Arguments, global: &Global) -> Result<()> {
+pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     output::refuse_stdout(&arguments.output)?;
-    if arguments.position {
-        arguments.size.units.imply_true_size();
-    }
     let settings = with!(
         Settings::default(),
         origin = arguments.origin(global.seed)?,
@@ -88,15 +77,7 @@ pub(crate) fn run(mut arguments: Arguments, global: &Global) -> Result<()> {
     // Shapes of the background are as they are meant to be.
     let has_background =
         arguments.sources.iter().any(|source| source == BACKGROUND) && !std::path::Path::new(BACKGROUND).exists();
-    for object in objects.iter().filter(|object| !has_background || object.name != BACKGROUND) {
-        for instance in object.instances() {
-            let complaints = Facts::of(&instance.mesh).complaints(object.millimeters);
-            if !complaints.is_empty() {
-                let name = if instance.name == object.name { String::new() } else { format!(", {}", instance.name) };
-                remark(&format!("{}{name}: {}", object.name, complaints.join(" ")));
-            }
-        }
-    }
+    objects.iter().filter(|object| !has_background || object.name != BACKGROUND).for_each(complain);
     cancel_when_interrupted();
     let summary = capture::capture(&objects, &settings, &arguments.output, &Bar::new())?;
     if global.json {
@@ -105,6 +86,17 @@ pub(crate) fn run(mut arguments: Arguments, global: &Global) -> Result<()> {
     let text = if settings.origin.approaches { kept(&summary) } else { table(&summary) };
     let placements = if settings.origin.scene.is_floating() { String::new() } else { described(&objects)? };
     output::print(&(text + &unreached(&summary, &settings.origin) + &placements))
+}
+
+/// Says to stderr what is wrong with an object's meshes.
+pub(super) fn complain(object: &Object) {
+    for instance in object.instances() {
+        let complaints = Facts::of(&instance.mesh).complaints(object.millimeters);
+        if !complaints.is_empty() {
+            let name = if instance.name == object.name { String::new() } else { format!(", {}", instance.name) };
+            remark(&format!("{}{name}: {}", object.name, complaints.join(" ")));
+        }
+    }
 }
 
 /// Contacts that are missing because the hand had stopped, by finger, and why.
@@ -141,27 +133,14 @@ impl Arguments {
     fn origin(&self, seed: Option<u64>) -> Result<Origin> {
         let base = self.size.origin(Origin::default())?;
         refuse_unstated(&self.size)?;
-        let position = self.position;
-        if let (true, Some(touches)) = (position, self.touches) {
-            return Err(Error::setting(
-                "touches",
-                touches,
-                "--approaches N with --position, which keeps every approach",
-            ));
-        }
-        if let (true, Some(length)) = (position, self.length) {
-            return Err(Error::setting("length", length, "true sizes with --position (--true-size UNIT)"));
-        }
         Ok(Origin {
             touches: self.approaches.or(self.touches).unwrap_or(base.touches),
             seed: seed.unwrap_or(base.seed),
             length: self.length.unwrap_or(base.length),
             aim: self.aim.unwrap_or(base.aim),
-            scene: if position { self.scene.straight_down(base.scene)? } else { self.scene.scene(base.scene)? },
-            pose: self.pose || position,
-            position,
-            within: self.within,
-            approaches: self.approaches.is_some() || position,
+            scene: self.scene.scene(base.scene)?,
+            pose: self.pose,
+            approaches: self.approaches.is_some(),
             samples: self.samples,
             real: self.size.probe.read()?.map_or(base.real, |file| file.real),
             ..base

@@ -1,19 +1,67 @@
-//! Maps: their settings as an option, and the training of a model of them.
+//! `palpate maps`: height maps of objects on a table.
 
 use super::Global;
+use super::capture::complain;
 use super::keys::pairs;
-use palpate::locate::{self, Maps, Real, Settings, Surface};
+use super::probe::{SizeArguments, refuse_unstated};
+use super::progress::{Bar, cancel_when_interrupted};
+use super::real::RealArguments;
+use super::teach::RecordedArguments;
+use palpate::locate::{self, Maps, Real, Settings, Standing, Surface};
 use palpate::output;
 use palpate::probe::noise::Noise;
 use palpate::probe::noise::quantity::{ANGLE, LENGTH, SHARE};
-use palpate::touches::Dataset;
+use palpate::touches::Origin;
 use palpate::with;
 use palpate::wording::{count, decimal, percent};
 use palpate::{Error, Result};
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Instant;
+
+#[derive(clap::Args)]
+#[command(arg_required_else_help = true, subcommand_required = true)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(clap::Subcommand)]
+enum Command {
+    /// Make height maps of objects on a table, from meshes or recorded touches
+    Train(Box<TrainArguments>),
+}
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+The maps say what a fingertip that comes straight down meets on each object in each pose that it rests in: a model for `palpate calibrate --objects` and `palpate recognize`. Meshes keep their true size. Touches of --teach need a position.
+
+Keys of --maps: cell, range, noise, lost, position, drift; docs/reference/options.md explains them.
+
+Examples:
+  palpate maps train meshes/ -o maps.palpate --true-size mm --probe hand.toml
+  palpate maps train builtin -o maps.palpate --true-size cm --probe hand.toml \\
+      --real noise=5ms,missed=2% --maps cell=2mm
+  palpate maps train meshes/ -o maps.palpate --probe hand.toml --teach pot.txt
+  palpate maps train --teach recorded -o maps.palpate")]
+struct TrainArguments {
+    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), directories of them
+    #[arg(value_name = "SOURCE", required_unless_present = "teach")]
+    sources: Vec<String>,
+    #[command(flatten)]
+    recorded: RecordedArguments,
+    /// Output; the model of maps
+    #[arg(short, long, value_name = "PATH")]
+    output: PathBuf,
+    /// Settings of maps, such as cell=2mm,range=30mm [default: those of the noise]
+    #[arg(long, value_name = "SETTINGS")]
+    maps: Option<MapSettings>,
+    #[command(flatten)]
+    size: SizeArguments,
+    #[command(flatten)]
+    real: RealArguments,
+}
 
 /// Settings of maps, as one text; those that are left open are those of the noise.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -92,11 +140,14 @@ impl MapSettings {
     }
 }
 
-/// A training of maps.
+/// Maps that were made.
 #[derive(serde::Serialize)]
 struct Trained<'m> {
     objects: usize,
     placements: Vec<OfPlacement<'m>>,
+    /// Poses of meshes that have no map since they are rare, with their shares.
+    left_out: Vec<(String, f64)>,
+    /// Number of recorded touches.
     touches: usize,
     cell: u8,
     range: f64,
@@ -112,33 +163,66 @@ struct OfPlacement<'m> {
     placement: &'m str,
     share: f64,
     round: bool,
-    /// Share of its cells that a touch met.
+    /// Share of its cells that is known: all of a mesh's.
     known: f64,
     bytes: usize,
 }
 
-/// Trains maps on touches with a position. `noise` is that of the option for noise.
-pub(super) fn train(
-    dataset: &Dataset,
-    noise: &Noise,
-    given: &MapSettings,
-    output: &Path,
-    global: &Global,
-) -> Result<()> {
+pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
+    let Command::Train(arguments) = arguments.command;
+    train(*arguments, global)
+}
+
+/// Makes maps of meshes, and of recorded touches with a position.
+fn train(arguments: TrainArguments, global: &Global) -> Result<()> {
+    let TrainArguments { sources, recorded, output, maps, mut size, real } = arguments;
+    let files = recorded.files();
+    output::admit(&output, files.iter().cloned().chain(sources.iter().map(PathBuf::from)))?;
     let start = Instant::now();
-    let probe = locate::probe_of(dataset)?;
-    let settings = Settings::default()
-        .expecting(&Real::like(&dataset.real(), probe.speed))
-        .expecting(&Real::of(noise, probe.speed)?);
-    let settings = given.over(settings);
+    let taught = |error: Error| match files.first() {
+        Some(path) if error.exit_code() == 1 => error.in_file(path),
+        _ => error,
+    };
+    let mut dataset = recorded.read()?.unwrap_or_default();
+    size.units.imply_true_size();
+    if dataset.origin.is_none() {
+        if !sources.is_empty() {
+            refuse_unstated(&size)?;
+        }
+        let file = size.probe.read()?;
+        dataset.origin = file.map(|file| Origin { probe: file.probe, unit: file.unit, ..Origin::default() });
+    }
+    size.origin(Origin::default())?;
+    let file = size.probe.read()?;
+    size.probe.of_dataset(file.as_ref(), &dataset)?;
+    let probe = locate::probe_of(&dataset).map_err(taught)?;
+    let noise = real.on_table(size.probe.noise(file.as_ref(), &dataset, Noise::default())?)?;
+    let settings = maps.unwrap_or_default().over(Settings::default().expecting(&Real::of(&noise, probe.speed)?));
     settings.check().map_err(|error| match error.kind() {
         palpate::error::Kind::Setting { name, value, allowed } => {
             Error::setting("maps", format!("{name}={value}"), allowed.clone())
         }
         _ => error,
     })?;
-    let surfaces = locate::learn(dataset, &settings)?;
-    let names = dataset.names();
+    let objects = if sources.is_empty() { Vec::new() } else { size.objects(&sources, global.seed())? };
+    objects.iter().for_each(complain);
+    if let Some(known) = dataset.objects.iter().find(|own| objects.iter().any(|object| object.name == own.name)) {
+        let allowed = "objects that have no mesh: maps of meshes are not adjusted";
+        return Err(Error::setting("teach", &known.name, allowed));
+    }
+    cancel_when_interrupted();
+    let standing = locate::standing(&objects.iter().collect::<Vec<_>>(), &probe, settings.noise, &Bar::new())?;
+    let cast = locate::cast(&standing, &probe, &settings)?;
+    let learned = locate::learn(&dataset, &settings).map_err(taught)?;
+    let mut names: Vec<String> = standing.iter().map(|object| object.name.clone()).chain(dataset.names()).collect();
+    let learned = learned.into_iter().map(|own| Surface { object: own.object + standing.len(), ..own });
+    let mut surfaces: Vec<(String, Surface)> =
+        cast.into_iter().chain(learned).map(|own| (names[own.object].clone(), own)).collect();
+    surfaces.sort_by(|(one, _), (other, _)| one.cmp(other));
+    names.sort();
+    let number = |name: &String| names.iter().position(|own| own == name).unwrap_or(0);
+    let surfaces: Vec<Surface> =
+        surfaces.into_iter().map(|(name, own)| Surface { object: number(&name), ..own }).collect();
     let bytes = locate::write(&surfaces, &names, &probe, &settings)?;
     // Written just now.
     let Ok(maps) = Maps::new(&bytes) else { unreachable!("they were read when they were written") };
@@ -150,9 +234,14 @@ pub(super) fn train(
         known: surface.known,
         bytes: maps.bytes_of(number),
     };
+    let left_out = |object: &Standing| {
+        let named = |(placement, share): &(String, f64)| (name(&object.name, placement), *share);
+        object.left_out.iter().map(named).collect::<Vec<_>>()
+    };
     let trained = Trained {
         objects: names.len(),
         placements: (0..=u8::MAX).zip(&surfaces).map(of).collect(),
+        left_out: standing.iter().flat_map(left_out).collect(),
         touches: dataset.len(),
         cell: maps.cell(),
         range: settings.range,
@@ -160,21 +249,18 @@ pub(super) fn train(
         bytes: bytes.len(),
         seconds: start.elapsed().as_secs_f64(),
     };
-    output::write_bytes(output, &bytes)?;
-    match global.json {
-        true => output::print_json_about(output, &trained),
-        false => output::print_about(output, &text(output, &trained)),
-    }
+    output::write_bytes(&output, &bytes)?;
+    global.print_about(&output, &trained, || text(&output, &trained))
 }
 
 fn text(output: &Path, trained: &Trained<'_>) -> String {
+    let touches = if trained.touches == 0 { String::new() } else { format!(" and {} touches", count(trained.touches)) };
     let mut text = format!(
-        "{}: maps of {} placements of {} objects from {} approaches, learned in {} s; {} bytes\n\
+        "{}: maps of {} placements of {} objects{touches}, made in {} s; {} bytes\n\
          cells of {} mm, places within {} mm, for {}\n",
         output.display(),
         trained.placements.len(),
         trained.objects,
-        count(trained.touches),
         decimal(trained.seconds, 1),
         count(trained.bytes),
         trained.cell,
@@ -187,13 +273,18 @@ fn text(output: &Path, trained: &Trained<'_>) -> String {
         // Writing to a string cannot fail.
         _ = writeln!(
             text,
-            "  {:width$} {:>6} {:>8} bytes, {} of its cells met{}",
+            "  {:width$} {:>6} {:>8} bytes{}{}",
             named(of),
             percent(of.share, 0),
             count(of.bytes),
-            percent(of.known, 0),
+            if of.known < 1.0 { format!(", {} of its cells met", percent(of.known, 0)) } else { String::new() },
             if of.round { ", round" } else { "" },
         );
+    }
+    let rare: Vec<String> =
+        trained.left_out.iter().map(|(name, share)| format!("{name} {}", percent(*share, 1))).collect();
+    if !rare.is_empty() {
+        _ = writeln!(text, "left out, since they are rare: {}", rare.join(", "));
     }
     text
 }

@@ -77,6 +77,8 @@ commands! {
     Capture => capture,
     /// Train an ensemble on captured touches
     Train => train,
+    /// Make height maps of objects on a table
+    Maps => maps,
     /// Compile an ensemble to the bytes that the chip reads
     Export => export,
     /// Set thresholds that keep an error rate, or plan approaches
@@ -205,7 +207,7 @@ fn remark(text: &str) {
 /// The commands as the program's help lists them.
 const GROUPS: [(&str, &[&str]); 5] = [
     ("Everything at once", &["run", "report"]),
-    ("Step by step", &["capture", "train", "export", "calibrate", "evaluate", "recognize"]),
+    ("Step by step", &["capture", "train", "maps train", "export", "calibrate", "evaluate", "recognize"]),
     ("A real probe", &["probe fit", "data record", "data check", "link"]),
     ("Models from elsewhere", &["export", "verify"]),
     ("Look", &["inspect", "view", "data objects"]),
@@ -442,7 +444,7 @@ fn refuse_located(dataset: &Dataset, directory: &Path) -> Result<()> {
 /// The problem of touches with a position for a model of trees.
 fn located() -> Error {
     problem!("touches with a position, which a model of trees does not use")
-        .fix("Train maps on touches with a position (`palpate train`), or leave positions out.")
+        .fix("Make maps of them (`palpate maps train --teach`), or leave the positions out.")
 }
 
 /// A data set whose warnings went to stderr.

@@ -12,14 +12,11 @@ use palpate::mesh::builtin;
 use palpate::output;
 use palpate::probe::Probe;
 use palpate::probe::noise::Noise;
-use palpate::touches::{Origin, Surroundings};
+use palpate::touches::Origin;
 use palpate::with;
 use palpate::{Error, Result};
 use palpate_report::play::{self, Contender, Settings};
 use std::path::PathBuf;
-
-/// Approaches to each object on a table that maps are learned from.
-const PRESSED: u64 = 50_000;
 
 /// A page to be made on which objects are touched.
 pub(super) struct Wanted {
@@ -27,18 +24,13 @@ pub(super) struct Wanted {
     /// Compiled models; that of the built-in objects if there are none.
     pub(super) model: Vec<PathBuf>,
     pub(super) output: PathBuf,
-    /// Approaches to each object on a table that maps are learned from.
-    pub(super) touches: Option<u64>,
     pub(super) size: SizeArguments,
     pub(super) real: RealArguments,
 }
 
 pub(super) fn run(wanted: Wanted, global: &Global) -> Result<()> {
-    let Wanted { mut sources, model, output, touches, size, real } = wanted;
+    let Wanted { mut sources, model, output, size, real } = wanted;
     let seed = global.seed();
-    if let Some(touches) = touches {
-        return Err(Error::setting("touches", touches, "it with --scene table: the page's models are given"));
-    }
     if sources.is_empty() {
         sources.push("builtin".into());
     }
@@ -87,15 +79,12 @@ fn contender(path: &PathBuf, origin: &Origin) -> Result<Contender> {
 
 /// Makes the page of a table.
 pub(super) fn on_table(wanted: Wanted, scene: &SceneArguments, global: &Global) -> Result<()> {
-    let Wanted { mut sources, model, output, touches, mut size, real } = wanted;
-    scene.straight_down(Surroundings::Table { cone: 0.0 })?;
+    let Wanted { mut sources, model, output, mut size, real } = wanted;
+    scene.check_straight_down()?;
     if !model.is_empty() {
-        return Err(Error::setting("model", "given", "it without --scene table: the page's maps are learned for it"));
+        return Err(Error::setting("model", "given", "it without --scene table: the page's maps are made for it"));
     }
-    let (touches, seed) = (touches.unwrap_or(PRESSED), global.seed());
-    if touches < 100 {
-        return Err(Error::setting("touches", touches, "100 or more"));
-    }
+    let seed = global.seed();
     if sources.is_empty() {
         sources.push("builtin".into());
     }
@@ -104,7 +93,7 @@ pub(super) fn on_table(wanted: Wanted, scene: &SceneArguments, global: &Global) 
     size.units.imply_unit();
     // The guide's hand, unless a file states another.
     let probe = with!(Probe::default(), radius = 1.5, spacing = 15.0, speed = 100.0, tilt = 0.0, stroke = Some(20.0));
-    let origin = size.origin(Origin { touches, seed, probe, ..Origin::default() })?;
+    let origin = size.origin(Origin { seed, probe, ..Origin::default() })?;
     let mut objects = size.objects(&sources, seed)?;
     if !(2..=play::MOST_OBJECTS).contains(&objects.len()) {
         let allowed = format!("2 to {} objects with --scene table", play::MOST_OBJECTS);
@@ -114,9 +103,7 @@ pub(super) fn on_table(wanted: Wanted, scene: &SceneArguments, global: &Global) 
     let stated = size.probe.read()?.map(|file| file.real).filter(|real| !real.is_none());
     let noise = real.on_table(stated.unwrap_or_else(|| Real::default().noise(origin.probe.speed)))?;
     let command = ["palpate", "view", "--play"].into_iter().chain(sources.iter().map(String::as_str));
-    let output_words =
-        ["-o", &output.to_string_lossy(), "--seed", &seed.to_string(), "--touches", &touches.to_string()]
-            .map(str::to_owned);
+    let output_words = ["-o", &output.to_string_lossy(), "--seed", &seed.to_string()].map(str::to_owned);
     let command = shell::command(command.chain(output_words.iter().chain(&words).map(String::as_str)));
     let page = play::table(&objects, &Settings { origin, noise, command }, &Bar::new())?;
     output::write_bytes(&output, page.as_bytes())?;

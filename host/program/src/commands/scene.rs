@@ -48,17 +48,11 @@ impl SceneArguments {
         Ok(scene)
     }
 
-    /// The table of approaches straight down; without options that of `base`.
-    ///
-    /// # Errors
-    /// Without a table, and for a cone above 0.
-    pub(crate) fn straight_down(&self, base: Surroundings) -> Result<Surroundings> {
-        match (self.scene.unwrap_or(base), self.cone) {
-            (Surroundings::Floating, _) => Err(Error::setting("scene", "floating", "table with --position")),
-            (_, Some(cone)) if cone != 0.0 => {
-                Err(Error::setting("cone", cone, "0 with --position, whose approaches come straight down"))
-            }
-            _ => Ok(Surroundings::Table { cone: 0.0 }),
+    /// Refuses a cone of approaches, where all of them come straight down.
+    pub(crate) fn check_straight_down(&self) -> Result<()> {
+        match self.cone {
+            Some(cone) => Err(Error::setting("cone", cone, "it with touches that are not straight down")),
+            None => Ok(()),
         }
     }
 
@@ -167,20 +161,6 @@ mod tests {
         assert_eq!(on_table.scene(table).unwrap(), table, "the cone of the data set that is added to");
         let steep = SceneArguments { cone: Some(120.0), ..on_table };
         assert!(steep.scene(Surroundings::Floating).is_err());
-    }
-
-    #[test]
-    fn approaches_with_a_position_need_a_table_and_come_straight_down() {
-        let down = Surroundings::Table { cone: 0.0 };
-        let on_table = SceneArguments { scene: scene("table").ok(), ..SceneArguments::default() };
-        assert_eq!(on_table.straight_down(Surroundings::Floating).unwrap(), down);
-        assert_eq!(SceneArguments::default().straight_down(down).unwrap(), down, "of the data set that is added to");
-        assert!(SceneArguments::default().straight_down(Surroundings::Floating).is_err());
-        let cone = |cone| SceneArguments { cone: Some(cone), ..on_table.clone() };
-        assert_eq!(cone(0.0).straight_down(Surroundings::Floating).unwrap(), down);
-        assert!(
-            cone(5.0).straight_down(Surroundings::Floating).unwrap_err().to_string().contains("Use 0 with --position")
-        );
     }
 
     #[test]

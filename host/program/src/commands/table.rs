@@ -97,14 +97,15 @@ impl TableArguments {
         };
         let maps = file.maps();
         let probe = locate::hand(&maps).map_err(|error| error.in_file(wanted.model))?;
-        let noise = wanted.real.on_table(locate::stated(&maps).noise(probe.speed))?;
+        let stated = locate::stated(&maps);
+        let noise = wanted.real.on_table(stated.noise(probe.speed))?;
         let mut units = self.units.clone();
         units.imply_true_size();
         let (touched, meshes): (Vec<String>, Vec<String>) =
             wanted.objects.iter().cloned().partition(|source| shape::is_touches(source));
         let objects = if meshes.is_empty() { Vec::new() } else { units.objects(&meshes, wanted.seed)? };
-        let mut standing = locate::standing(&objects.iter().collect::<Vec<_>>(), &probe, &Bar::new())?;
-        let hand = ProbeFile { probe, unit: Length::Millimeter, real: locate::stated(&maps).noise(probe.speed) };
+        let mut standing = locate::standing(&objects.iter().collect::<Vec<_>>(), &probe, stated.height, &Bar::new())?;
+        let hand = ProbeFile { probe, unit: Length::Millimeter, real: stated.noise(probe.speed) };
         for source in &touched {
             let Touched { name, shape, .. } = shape::read(Path::new(source), &hand)?;
             standing.push(shape.standing(&name)?);

@@ -1,18 +1,24 @@
 //! Options and output of `palpate train` for recorded touches.
 
 use palpate::error::{Error, Place, Result, problem};
-use palpate::probe::file::ProbeFile;
 use palpate::teach::{Taught, TaughtObject};
-use palpate::touches::{Dataset, ObjectTouches, Origin, is_log};
+use palpate::touches::{Dataset, ObjectTouches, is_log};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+
+/// Recorded touches.
+#[derive(clap::Args, Clone, Debug, Default)]
+pub(crate) struct RecordedArguments {
+    /// Recorded touches of new objects; a directory, a file called like its object, or a log; repeatable
+    #[arg(long, value_name = "DIR|FILE")]
+    teach: Vec<PathBuf>,
+}
 
 /// Recorded touches, and what they are taught to.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub(crate) struct TeachArguments {
-    /// Recorded touches of new objects; a directory, a file called like its object, or a log; repeatable
-    #[arg(long, value_name = "DIR|FILE")]
-    pub(crate) teach: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(crate) recorded: RecordedArguments,
     /// Teach the recorded touches to this ensemble, instead of training another one
     #[arg(
         long,
@@ -25,6 +31,13 @@ pub(crate) struct TeachArguments {
 }
 
 impl TeachArguments {
+    /// The files that are read, none of which may be written.
+    pub(crate) fn files(&self) -> Vec<PathBuf> {
+        self.recorded.files().into_iter().chain(self.extend.clone()).collect()
+    }
+}
+
+impl RecordedArguments {
     /// The recorded objects of all that was given; none if nothing was.
     pub(crate) fn read(&self) -> Result<Option<Dataset>> {
         let mut all: Option<Dataset> = None;
@@ -42,7 +55,7 @@ impl TeachArguments {
     /// The files that are read, none of which may be written.
     pub(crate) fn files(&self) -> Vec<PathBuf> {
         let of = |path: &PathBuf| if path.is_dir() { super::files_of(path) } else { vec![path.clone()] };
-        self.teach.iter().flat_map(of).chain(self.extend.clone()).collect()
+        self.teach.iter().flat_map(of).collect()
     }
 }
 
@@ -50,26 +63,6 @@ impl TeachArguments {
 fn file(path: &Path) -> Result<Dataset> {
     let touches = Dataset::read_file(path)?;
     Ok(Dataset::new(vec![touches]))
-}
-
-/// Recorded touches with a position beside simulated ones, for maps; alone they are of the probe in a file.
-pub(crate) fn beside(
-    simulated: Option<Dataset>,
-    recorded: Option<Dataset>,
-    file: Option<&ProbeFile>,
-) -> Result<Dataset> {
-    let (simulated, recorded) = (simulated.unwrap_or_default(), recorded.unwrap_or_default());
-    if let Some(known) =
-        recorded.objects.iter().find(|own| simulated.objects.iter().any(|other| other.name == own.name))
-    {
-        let allowed = "objects that the data set does not have: maps of known ones are not adjusted";
-        return Err(Error::setting("teach", &known.name, allowed));
-    }
-    let stated = |file: &ProbeFile| Origin { probe: file.probe, unit: file.unit, position: true, ..Origin::default() };
-    let origin = simulated.origin.or(recorded.origin).or(file.map(stated));
-    let mut all = Dataset { origin, ..Dataset::new([simulated.objects, recorded.objects].concat()) };
-    all.objects.sort_by(|a, b| a.name.cmp(&b.name));
-    Ok(all)
 }
 
 /// Adds the objects of `read`, from `path`. Several recordings of one object with positions are all of it.

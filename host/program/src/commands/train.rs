@@ -1,5 +1,4 @@
 use super::Global;
-use super::maps::MapSettings;
 use super::probe::ProbeArguments;
 use super::progress::Bar;
 use super::real::RealArguments;
@@ -25,7 +24,7 @@ use std::time::Instant;
 /// Train an ensemble on captured touches, and save it as XGBoost JSON.
 #[derive(clap::Args)]
 #[command(after_help = "\
-From touches with a position (capture --position) it makes a model of maps, ready for calibrate and recognize. The ensemble is XGBoost's JSON. Its features are in microseconds, where data sets have seconds, and cosines in units of 1/32767.
+The ensemble is XGBoost's JSON. Its features are in microseconds, where data sets have seconds, and cosines in units of 1/32767.
 
 Presets: compact is accurate (leaves hold a value per object; curvature), small takes two fifths of its bytes, tiny a seventh; paper is the published method (one tree per object and round; contact times). Keys of --trees: rounds, depth, eta, min_child_weight, bins, leaves, leaf_bits, trainer; docs/reference/options.md explains them, --teach and --evidence.
 
@@ -38,8 +37,6 @@ Examples:
   palpate train approaches -o all.json --evidence all
   palpate train approaches -o wary.json --background shapes
   palpate train approaches -o taught.json --teach pot.txt
-  palpate train located -o maps.palpate --maps cell=2mm
-  palpate train located -o maps.palpate --teach pot.txt
   palpate train --teach recorded -o own.json")]
 pub(crate) struct Arguments {
     /// Touches to train on: a directory that `palpate capture` filled
@@ -47,7 +44,7 @@ pub(crate) struct Arguments {
     directory: Option<PathBuf>,
     #[command(flatten)]
     teach: TeachArguments,
-    /// Output; the ensemble, or the model of maps
+    /// Output; the ensemble
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
     /// Touches of many other shapes; they train a column for what the model does not know
@@ -68,9 +65,6 @@ pub(crate) struct Arguments {
     /// Settings of the trees, such as rounds=30,depth=6,eta=0.3 [default: the preset's]
     #[arg(long, value_name = "SETTINGS")]
     trees: Option<Trees>,
-    /// Settings of maps, from touches with a position, such as cell=2mm,range=30mm [default: those of the noise]
-    #[arg(long, value_name = "SETTINGS")]
-    maps: Option<MapSettings>,
     #[command(flatten)]
     probe: ProbeArguments,
     #[command(flatten)]
@@ -123,18 +117,10 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let read: Vec<PathBuf> = read.chain(arguments.teach.files()).collect();
     output::admit(&arguments.output, &read)?;
     let start = Instant::now();
-    let recorded = arguments.teach.read()?;
+    let recorded = arguments.teach.recorded.read()?;
     let dataset = arguments.directory.as_deref().map(super::dataset).transpose()?;
-    let is_located = |dataset: &&Dataset| super::is_located(dataset);
-    if dataset.as_ref().or(recorded.as_ref()).filter(is_located).is_some() {
-        let paths = [arguments.directory.clone(), arguments.teach.files().into_iter().next()];
-        return maps(&arguments, dataset, recorded, global).map_err(|error| match paths.into_iter().flatten().next() {
-            Some(path) if error.exit_code() == 1 => error.in_file(&path),
-            _ => error,
-        });
-    }
-    if arguments.maps.is_some() {
-        return Err(Error::setting("maps", "given", "it with touches that have a position (capture --position)"));
+    if let (Some(dataset), Some(path)) = (&dataset, &arguments.directory) {
+        super::refuse_located(dataset, path)?;
     }
     if let (Some(recorded), Some(path)) = (&recorded, arguments.teach.files().first()) {
         super::refuse_located(recorded, path)?;
@@ -218,32 +204,6 @@ fn text(output: &Path, trained: &Trained<'_>, made: &Made) -> String {
     // A remark, not a result.
     let cost = if super::is_quiet() { String::new() } else { cost(trained, made.is_clean) };
     text + &cost + &trained.taught.map_or_else(String::new, super::teach::text)
-}
-
-/// Trains maps on touches with a position, without the options of trees.
-fn maps(arguments: &Arguments, simulated: Option<Dataset>, recorded: Option<Dataset>, global: &Global) -> Result<()> {
-    let of_trees = [
-        ("extend", arguments.teach.extend.is_some()),
-        ("background", arguments.background.is_some()),
-        ("preset", arguments.preset.is_some()),
-        ("descriptor", arguments.descriptor.is_some()),
-        ("evidence", arguments.evidence.is_some()),
-        ("outputs", arguments.outputs.is_some()),
-        ("trees", arguments.trees.is_some()),
-    ];
-    if let Some((option, _)) = of_trees.iter().find(|(_, is_given)| *is_given) {
-        return Err(Error::setting(
-            option,
-            "given",
-            "it with touches without a position; touches with one make maps (--maps)",
-        ));
-    }
-    let file = arguments.probe.read()?;
-    let dataset = super::teach::beside(simulated, recorded, file.as_ref())?;
-    arguments.probe.of_dataset(file.as_ref(), &dataset)?;
-    let noise = arguments.real.on_table(arguments.probe.noise(file.as_ref(), &dataset, Noise::default())?)?;
-    let given = arguments.maps.clone().unwrap_or_default();
-    super::maps::train(&dataset, &noise, &given, &arguments.output, global)
 }
 
 /// Trains on simulated touches, or takes the ensemble that was, and teaches it the recorded ones, if there are any.

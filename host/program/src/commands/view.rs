@@ -45,8 +45,8 @@ pub(crate) struct Arguments {
     /// Output; the page
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
-    /// Touches of each object; to show [default: 24], or with --play --scene table to learn maps from [default: 50000]
-    #[arg(long, value_name = "N", value_parser = super::numbers::count)]
+    /// Touches of each object; to show [default: 24]
+    #[arg(long, value_name = "N", value_parser = super::numbers::count, conflicts_with = "play")]
     touches: Option<u64>,
     /// Make a page on which the objects are touched
     #[arg(long)]
@@ -83,8 +83,8 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     }
     let scene = arguments.scene.scene(Surroundings::Floating)?;
     if arguments.play {
-        let Arguments { sources, model, output, touches, size, real, scene: on, .. } = arguments;
-        let wanted = play::Wanted { sources, model, output, touches, size, real };
+        let Arguments { sources, model, output, size, real, scene: on, .. } = arguments;
+        let wanted = play::Wanted { sources, model, output, size, real };
         return if scene.is_floating() { play::run(wanted, global) } else { play::on_table(wanted, &on, global) };
     }
     let Arguments { sources, output, touches, size, real, .. } = &arguments;

@@ -1,4 +1,4 @@
-use crate::fixtures::{HAND, brick};
+use crate::fixtures::brick;
 use crate::{
     Folder, command, complains, fails, figures, globe, listing, palpate, read, says, stderr, stdout, succeeds,
 };
@@ -82,9 +82,6 @@ fn every_approach_is_kept_when_asked_and_one_that_touches_nothing_is_three_dashe
 #[test]
 fn wrong_arguments_are_refused_by_name_and_nothing_is_left_behind() {
     let at = &meshes();
-    std::fs::write(at.join("probe.toml"), "unit = \"mm\"\nradius = 1.5\nspacing = 15\nspeed = 100\n").unwrap();
-    let located = "capture meshes -o out --position --true-size mm --probe probe.toml";
-    let table = &format!("{located} --scene table");
     let capture = "capture meshes -o out";
     for (command, more, code, expected) in [
         ("capture nowhere.obj -o out", "", 1, "nowhere.obj: cannot read the mesh"),
@@ -110,10 +107,7 @@ fn wrong_arguments_are_refused_by_name_and_nothing_is_left_behind() {
         (capture, "--scene moon", 2, "use one of floating, table"),
         (capture, "--scene table --placements globe/+q=1", 1, "globe has no placement +q: it has "),
         (capture, "--scene table --placements globe", 2, "such as mug/+z=3"),
-        (capture, "--position --scene table", 2, "probe is not given"),
-        (capture, "--position --scene table --probe probe.toml", 1, "the true size is unknown … --true-size"),
-        (located, "", 2, "scene is floating. Use table with --position"),
-        (table, "--touches 30", 2, "touches is 30. Use --approaches N with --position"),
+        (capture, "--position", 2, "`--position` was removed: make maps of meshes with palpate maps train"),
     ] {
         fails(at, &format!("{command} {more}"), code, expected);
         assert!(!at.join("out/globe.txt").exists(), "{more}");
@@ -132,27 +126,6 @@ fn objects_on_a_table_are_captured_in_their_placements_which_the_output_and_the_
     let first = &listing["objects"][1]["placements"][0];
     let name = first["name"].as_str().unwrap();
     assert!(first["weight"].as_f64().unwrap() > 0.0 && said.contains(&format!(": {name} ")), "{said}");
-}
-
-#[test]
-fn touches_with_a_position_are_captured_straight_down_and_recorded_with_it() {
-    let at = &meshes();
-    std::fs::write(at.join("probe.toml"), "unit = \"mm\"\nradius = 1.5\nspacing = 15\nspeed = 100\n").unwrap();
-    let table = "--scene table --position --true-size mm --probe probe.toml";
-    succeeds(at, &format!("capture meshes -o out {table} --approaches 40 --within 2"));
-    let listing = read(&at.join("out/dataset.json"));
-    let settings = &listing["settings"];
-    assert_eq!(settings["scene"], serde_json::json!({"table": {"cone": 0.0}}));
-    assert_eq!([&settings["position"], &settings["pose"], &settings["approaches"]], [true, true, true]);
-    assert_eq!((settings["within"].as_f64(), settings["touches"].as_u64()), (Some(2.0), Some(40)));
-    let lines = std::fs::read_to_string(at.join("out/globe.txt")).unwrap();
-    assert_eq!(lines.lines().count(), 40);
-    assert!(lines.lines().all(|line| line.split(' ').count() == 12), "{lines}");
-    // What is recorded from such lines states the position too.
-    let record = "data record out/globe.txt -o recorded --object globe --pose --probe probe.toml";
-    fails(at, record, 1, "globe.txt: a position, where the touches recorded here have none");
-    succeeds(at, &format!("{record} --position"));
-    assert_eq!(std::fs::read_to_string(at.join("recorded/globe.txt")).unwrap(), lines);
 }
 
 /// Runs a shell script, which gets the program as $1 and the directory as $2; none where it cannot be run.
@@ -295,7 +268,6 @@ fn bricks() -> Folder {
     let real = "speed_factor = 0.9\noffsets = [0.0, -0.04, 0.0]\nnoise = \"2ms\"\ntimer = \"1ms\"\nmissed = [\"0%\", \"4%\", \"0%\"]\n";
     let probe = format!("radius = 0.15\nspacing = 1.5\nspeed = 10.0\n[real]\n{real}");
     std::fs::write(at.join("real.toml"), probe).unwrap();
-    std::fs::write(at.join("hand.toml"), HAND).unwrap();
     at
 }
 
@@ -311,11 +283,6 @@ fn touches_are_those_of_version_0_3_0_in_one_thread_in_four_and_in_parts() {
         ("meshes --seed 5 --probe real.toml --touches", 200, [2_268_446_266, 4_118_118_332]),
         ("meshes --seed 6 --scene table --pose --approaches", 400, [2_592_788_561, 339_739_495]),
         ("meshes --seed 7 --scene table --cone 30 --touches", 200, [420_478_625, 1_441_037_996]),
-        (
-            "meshes --seed 8 --scene table --position --true-size mm --probe hand.toml --approaches",
-            300,
-            [2_402_765_942, 2_582_309_632],
-        ),
         ("set --seed 9 --instances --touches", 300, [1_938_372_531, 861_611_217]),
         ("meshes --seed 10 --length 5 --aim middle --touches", 300, [2_798_672_090_u32, 3_616_987_438]),
     ] {

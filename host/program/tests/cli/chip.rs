@@ -1,8 +1,8 @@
 //! The commands that talk to a chip, with a chip's whole program behind a TCP connection.
 
 use crate::chip_wire::Wire;
-use crate::fixtures::{LOCATED, ONE_SPLIT};
-use crate::locate::{of_one_placement, recognized};
+use crate::fixtures::{LOCATED, ONE_SPLIT, pressed_box};
+use crate::locate::recognized;
 use crate::{command, complains, fails, figures, json, lines, listen, piped, run, says, stderr, stdout, succeeds};
 use palpate_onboard::Model;
 use palpate_onboard::station::{Memory, NoStorage, RECORD_LENGTH, Station, Table, serve, serve_with};
@@ -48,7 +48,7 @@ fn chip_with_table() -> String {
 fn a_chip_with_maps_says_verdicts_places_and_approaches_as_the_host_does() {
     let at = &LOCATED.folder();
     // An empty line begins another object.
-    let mut touches = of_one_placement(at, 12);
+    let mut touches = pressed_box([60.0, 40.0, 30.0], 12);
     touches.insert(2, "\n".into());
     let said = recognized(at, "maps.palpate --next", &touches.concat());
     assert!(said.iter().any(|line| line["verdict"] == "recognized"), "{said:?}");

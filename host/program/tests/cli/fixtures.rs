@@ -205,14 +205,53 @@ pub(crate) static CROOKED: Fixture = Fixture::new(|at| {
     fs::remove_file(at.join("recorded/dataset.json")).unwrap();
 });
 
+/// The command that makes maps of the two boxes.
+pub(crate) const MAPS: &str = "maps train meshes --true-size mm --probe hand.toml --maps cell=2mm,range=20mm";
+
 /// A hand over a table.
 pub(crate) const HAND: &str = "unit = \"mm\"\nradius = 1.5\nspacing = 15\nspeed = 100\ntilt = 0\nstroke = 20\n";
 
-/// Two boxes in `meshes`, touches of them with positions in `data`, and `maps.palpate`.
+/// Lines of a hand that presses a surface, which lies at a place and is turned: within `half` of its `middle`, with the row along x.
+pub(crate) fn pressed(
+    surface: impl Fn([f64; 2]) -> f64,
+    [middle, half]: [[f64; 2]; 2],
+    place: [f64; 2],
+    yaw: f64,
+    count: usize,
+) -> Vec<String> {
+    let (sin, cos) = yaw.sin_cos();
+    let line = |number: usize| {
+        let share = |step: f64| (number as f64 * step).fract() * 2.0 - 1.0;
+        let [u, v] = [middle[0] + half[0] * share(0.754_877_666), middle[1] + half[1] * share(0.569_840_291)];
+        let [x, y] = [place[0] + cos * u - sin * v, place[1] + sin * u + cos * v];
+        let heights = [-15.0, 0.0, 15.0].map(|finger| {
+            let [dx, dy] = [x + finger - place[0], y - place[1]];
+            surface([cos * dx + sin * dy, cos * dy - sin * dx])
+        });
+        let first = heights.into_iter().fold(0.0, f64::max);
+        // Later than the stroke there is no contact.
+        let time =
+            |height: f64| if first - height > 20.0 { "-".into() } else { format!("{:.6}", (first - height) / 100.0) };
+        let [one, two, three] = heights.map(time);
+        format!("{one} {two} {three} 0 0 -1 1 0 0 {x:.3} {y:.3} {first:.3}\n")
+    };
+    (0..count).map(line).collect()
+}
+
+/// Lines of a hand that presses a box of this height, which lies on its largest side in the middle of the table.
+pub(crate) fn pressed_box([x, y, height]: [f64; 3], count: usize) -> Vec<String> {
+    let half = [x / 2.0, y / 2.0];
+    let surface = |[u, v]: [f64; 2]| if u.abs() <= half[0] && v.abs() <= half[1] { height } else { 0.0 };
+    pressed(surface, [[0.0; 2], half.map(|half| half + 5.0)], [0.0; 2], 0.0, count)
+}
+
+/// Two boxes in `meshes`, `maps.palpate` of them, and touches of them with positions in `data`.
 pub(crate) static LOCATED: Fixture = Fixture::new(|at| {
     boxes(at);
     fs::write(at.join("hand.toml"), HAND).unwrap();
-    let table = "--scene table --position --probe hand.toml --true-size mm";
-    succeeds(at, &format!("capture meshes -o data {table} --approaches 6000"));
-    succeeds(at, "train data -o maps.palpate --maps cell=2mm,range=20mm");
+    succeeds(at, &format!("{MAPS} -o maps.palpate"));
+    for (name, sides) in [("brick", [60.0, 40.0, 30.0]), ("slab", [70.0, 50.0, 10.0])] {
+        fs::write(at.join("lines.txt"), pressed_box(sides, 60).concat()).unwrap();
+        succeeds(at, &format!("data record lines.txt -o data --object {name} --position --probe hand.toml"));
+    }
 });

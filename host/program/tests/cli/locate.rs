@@ -1,7 +1,7 @@
-//! Maps from touches with a position, through every command that takes them.
+//! Maps of meshes and of touches with a position, through every command that takes them.
 
-use crate::fixtures::{HAND, LOCATED, brick};
-use crate::{Folder, fails, figures, lines, read, says, succeeds};
+use crate::fixtures::{self, HAND, LOCATED, MAPS, brick, pressed_box};
+use crate::{Folder, fails, figures, lines, says, succeeds};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -12,23 +12,21 @@ pub(crate) fn recognized(at: &Path, words: &str, text: &str) -> Vec<Value> {
     lines(&succeeds(at, &format!("recognize {words} lines.txt")))
 }
 
-/// Touches of the brick in its first placement and in its own frame: at the origin, not turned.
-pub(crate) fn of_one_placement(at: &Path, count: usize) -> Vec<String> {
-    let placements = read(&at.join("data/dataset.json"))["objects"][0]["placements"].as_array().unwrap().len();
-    let text = fs::read_to_string(at.join("data/brick.txt")).unwrap();
-    text.lines().step_by(placements).take(count).map(|line| format!("{line}\n")).collect()
-}
-
 #[test]
-fn objects_are_located_with_maps_from_a_capture_to_a_verdict() {
+fn objects_are_located_with_maps_from_meshes_to_a_promise() {
     let at = &LOCATED.folder();
-    let trained = figures(at, "train data -o again.palpate --maps cell=2mm,range=20mm");
+    let trained = figures(at, &format!("{MAPS} -o again.palpate --threads 1 --seed 9"));
     let bytes = fs::read(at.join("maps.palpate")).unwrap();
     assert_eq!(fs::read(at.join("again.palpate")).unwrap(), bytes);
     assert_eq!((trained["objects"].as_u64(), trained["bytes"].as_u64()), (Some(2), Some(bytes.len() as u64)));
     // A box lies on three kinds of sides.
     let placements = trained["placements"].as_array().unwrap();
-    assert!((2..=6).contains(&placements.len()), "{trained}");
+    assert_eq!((placements.len(), trained["touches"].as_u64()), (6, Some(0)), "{trained}");
+    let said = says(at, &format!("{MAPS} -o again.palpate"), &["maps of 6 placements of 2 objects, made in "]);
+    assert!(!said.contains("left out") && !said.contains("cells met"), "{said}");
+    brick(&at.join("card.obj"), [80.0, 60.0, 4.0]);
+    let card = "maps train card.obj -o card.palpate --true-size mm --probe hand.toml";
+    says(at, card, &["left out, since they are rare: card/"]);
 
     let inspected = figures(at, "inspect maps.palpate");
     assert_eq!(inspected["placements"].as_array().unwrap().len(), placements.len());
@@ -66,7 +64,7 @@ fn objects_are_located_with_maps_from_a_capture_to_a_verdict() {
 #[test]
 fn each_touch_gives_a_verdict_a_place_and_the_next_approach_until_an_object_is_named() {
     let at = &LOCATED.folder();
-    let touches = of_one_placement(at, 30);
+    let touches = pressed_box([60.0, 40.0, 30.0], 30);
     let said = recognized(at, "maps.palpate --next", &touches.concat());
     let end = said.iter().position(|line| line["verdict"] != "undecided").unwrap();
     assert_eq!((said[end]["verdict"].as_str(), said[end]["object"].as_str()), (Some("recognized"), Some("brick")));
@@ -119,17 +117,32 @@ fn maps_and_trees_are_refused_where_the_other_is_needed_with_what_to_do() {
     succeeds(at, "capture meshes -o free --touches 300");
     succeeds(at, "train free -o e.json --trees rounds=2,depth=2");
     succeeds(at, "export e.json -o trees.palpate");
-    for (name, line) in
-        [("located", "0 0 0 0 0 -1 1 0 0 1 2 3\n"), ("plain", "0 0 0\n"), ("deep", "0 0 900 0 0 -1 1 0 0 1 2 3\n")]
-    {
+    for (name, line) in [
+        ("located", "0 0 0 0 0 -1 1 0 0 1 2 3\n"),
+        ("plain", "0 0 0\n"),
+        ("deep", "0 0 900 0 0 -1 1 0 0 1 2 3\n"),
+        ("brick", "0 0 0 0 0 -1 1 0 0 1 2 3\n"),
+    ] {
         fs::write(at.join(format!("{name}.txt")), line).unwrap();
     }
     for (words, code, expected) in [
-        ("train data -o x.palpate --trees depth=3", 2, "--trees is given. Use it with touches without a position"),
-        ("train data -o x.palpate --preset paper", 2, "--preset is given"),
-        ("train data -o x.palpate --maps range=500mm", 2, "--maps is range=500. Use a number of millimeters"),
-        ("train data -o x.palpate --real debounce=2ms", 1, "a simulated table has other noise"),
-        ("train free -o x.palpate --maps cell=2mm", 2, "--maps is given. Use it with touches that have a position"),
+        ("train data -o x.json", 1, "data: touches with a position … palpate maps train --teach"),
+        ("train free --teach data -o x.json", 1, ": touches with a position … palpate maps train --teach"),
+        ("train free -o x.palpate --maps cell=2mm", 2, "`--maps` was removed: make maps with palpate maps train"),
+        (&format!("{MAPS},noise=9mm -o x.palpate"), 2, "--maps is noise=9. Use a number of millimeters"),
+        (&format!("{MAPS} -o x.palpate --real debounce=2ms"), 1, "a simulated table has other noise"),
+        (&format!("{MAPS} -o x.palpate --teach brick.txt"), 2, "--teach is brick. Use objects that have no mesh"),
+        ("maps train meshes -o x.palpate --true-size mm", 2, "--probe is not given"),
+        ("maps train meshes -o x.palpate --probe hand.toml", 1, "the true size is unknown … --true-size"),
+        ("maps train --teach plain.txt -o x.palpate --probe hand.toml", 1, "plain: touch 1 has no position"),
+        ("maps train -o x.palpate", 2, "SOURCE"),
+        (
+            "data record located.txt -o x --object pot --pose --probe hand.toml",
+            1,
+            "located.txt: a position, where the touches recorded here have none",
+        ),
+        ("capture meshes -o x --position", 2, "`--position` was removed: make maps of meshes with palpate maps train"),
+        ("capture meshes -o x --within 3", 2, "`--within` was removed: make maps of meshes with palpate maps train"),
         ("train free -o x.palpate --real drift=1mm/1deg", 2, "--real is drift"),
         ("recognize maps.palpate plain.txt", 1, "plain.txt:1: the touch has no position. Give twelve"),
         ("recognize maps.palpate deep.txt", 1, "below the table. Give times in seconds"),
@@ -178,8 +191,9 @@ fn presses_on_the_bare_table_measure_it_and_the_fingertips() {
     );
     let file = fs::read_to_string(at.join("hand.toml")).unwrap();
     assert!(file.contains("\noffsets = [0.600, 0.0, -0.900]"), "{file}");
+    // The hand as it is makes touches of objects.
     brick(&at.join("brick.obj"), [60.0, 40.0, 30.0]);
-    succeeds(at, "capture brick.obj -o data --scene table --position --probe hand.toml --true-size mm --approaches 20");
+    succeeds(at, "capture brick.obj -o data --scene table --pose --probe hand.toml --true-size mm --approaches 20");
     fs::write(at.join("few.txt"), presses.split_inclusive('\n').take(9).collect::<String>()).unwrap();
     fs::write(at.join("plain.txt"), "0 0 0\n").unwrap();
     for (words, code, expected) in [
@@ -195,32 +209,20 @@ fn presses_on_the_bare_table_measure_it_and_the_fingertips() {
 
 /// Lines of a hand that presses an L of 20 and 10 mm height, scaled, which lies at a place and is turned.
 fn pressed(scale: f64, place: [f64; 2], yaw: f64, count: usize) -> String {
-    let (sin, cos) = yaw.sin_cos();
     let height = |[x, y]: [f64; 2]| match () {
         () if (0.0..=60.0).contains(&x) && (0.0..=20.0).contains(&y) => 20.0 * scale,
         () if (0.0..=20.0).contains(&x) && (0.0..=50.0).contains(&y) => 10.0 * scale,
         () => 0.0,
     };
-    let line = |number: usize| {
-        let share = |step: f64| (number as f64 * step).fract() * 2.0 - 1.0;
-        let [u, v] = [25.0 + 42.0 * share(0.754_877_666), 25.0 + 36.0 * share(0.569_840_291)];
-        let [x, y] = [place[0] + cos * u - sin * v, place[1] + sin * u + cos * v];
-        let heights = [-15.0, 0.0, 15.0].map(|finger| {
-            let [dx, dy] = [x + finger - place[0], y - place[1]];
-            height([cos * dx + sin * dy, cos * dy - sin * dx])
-        });
-        let first = heights.into_iter().fold(0.0, f64::max);
-        let [one, two, three] = heights.map(|height| (first - height) / 100.0);
-        format!("{one:.6} {two:.6} {three:.6} 0 0 -1 1 0 0 {x:.3} {y:.3} {first:.3}\n")
-    };
-    (0..count).map(line).collect()
+    fixtures::pressed(height, [[25.0; 2], [42.0, 36.0]], place, yaw, count).concat()
 }
 
 #[test]
 fn an_object_without_a_mesh_is_taught_by_touches_with_a_position() {
     let at = &LOCATED.folder();
     fs::write(at.join("pot.txt"), pressed(1.0, [0.0; 2], 0.0, 300)).unwrap();
-    let trained = figures(at, "train data --teach pot.txt -o mixed.palpate --maps cell=2mm,range=30mm");
+    let trained =
+        figures(at, &format!("{} --teach pot.txt -o mixed.palpate", MAPS.replace("range=20mm", "range=30mm")));
     assert_eq!(trained["objects"], 3);
     let pot = trained["placements"].as_array().unwrap().iter().filter(|own| own["object"] == "pot").count();
     assert_eq!(pot, 1);
@@ -229,14 +231,20 @@ fn an_object_without_a_mesh_is_taught_by_touches_with_a_position() {
     // The promise is for the taught object, too.
     let calibrate = "calibrate mixed.palpate --objects meshes pot.txt --true-size mm -o sure.palpate";
     succeeds(at, &format!("{calibrate} --sequences 20 --error-rate 40%"));
-    says(at, "train --teach pot.txt -o own.palpate --probe hand.toml", &["maps of 1 placements of 1 objects"]);
+    says(
+        at,
+        "maps train --teach pot.txt -o own.palpate --probe hand.toml",
+        &["maps of 1 placements of 1 objects and 300 touches", " of its cells met"],
+    );
     // Another recording, turned, is of the same surface.
     fs::create_dir(at.join("later")).unwrap();
     fs::write(at.join("later/pot.txt"), pressed(1.0, [10.0, 5.0], 1.0, 200)).unwrap();
-    says(at, "train --teach pot.txt --teach later/pot.txt -o own.palpate --probe hand.toml", &["maps of 1 placements"]);
-    fails(at, "train --teach pot.txt -o own.palpate", 1, "not of objects at their true size");
-    fs::rename(at.join("pot.txt"), at.join("brick.txt")).unwrap();
-    fails(at, "train data --teach brick.txt -o own.palpate", 2, "objects that the data set does not have");
+    says(
+        at,
+        "maps train --teach pot.txt --teach later/pot.txt -o own.palpate --probe hand.toml",
+        &["maps of 1 placements"],
+    );
+    fails(at, "maps train --teach pot.txt -o own.palpate", 1, "not of objects at their true size");
 }
 
 #[test]
@@ -253,7 +261,7 @@ fn recordings_of_objects_that_stood_still_test_a_promise() {
         }
     }
     for hand in ["hand", "other"] {
-        succeeds(at, &format!("train --teach pot.txt --teach lid.txt -o {hand}.palpate --probe {hand}.toml"));
+        succeeds(at, &format!("maps train --teach pot.txt --teach lid.txt -o {hand}.palpate --probe {hand}.toml"));
     }
     let calibrate = "calibrate hand.palpate --recorded stays -o sure.palpate";
     let said = succeeds(at, &format!("{calibrate} --error-rate 40%"));

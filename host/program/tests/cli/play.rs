@@ -29,12 +29,12 @@ fn a_page_without_a_model_has_that_of_the_built_in_objects() {
 }
 
 #[test]
-fn a_page_of_a_table_holds_maps_of_its_objects_and_says_what_they_were_learned_from() {
+fn a_page_of_a_table_holds_maps_of_its_objects_and_says_what_they_expect() {
     let at = &Folder::new();
     let objects = "bowl mouse --placements bowl/+z=1 --real missed=5%";
-    succeeds(at, &format!("view --play --scene table --touches 4000 -o table.html {objects}"));
+    succeeds(at, &format!("view --play --scene table -o table.html {objects}"));
     let text = fs::read_to_string(at.join("table.html")).unwrap();
-    assert!(text.contains("from 4,000 simulated approaches") && text.contains("5 % of contacts to be lost"));
+    assert!(text.contains("The maps are of the meshes: ") && text.contains("5 % of contacts to be lost"));
     assert!(text.contains("\"maps\":") && text.contains("\"name\":\"mouse\""));
 }
 
@@ -44,15 +44,15 @@ fn what_cannot_be_played_with_writes_no_page() {
     fs::write(at.join("bad.palpate"), b"no model").unwrap();
     fs::write(at.join("wide.toml"), "radius = 0.15\nspacing = 2\nspeed = 10\n").unwrap();
     globe(at, "round", 8);
-    let table = "bowl mouse --scene table --touches 4000";
+    let table = "bowl mouse --scene table";
     for (wrong, code, expected) in [
         ("bowl --model bad.palpate", 1, "bad.palpate"),
-        ("bowl --touches 300", 2, "touches is 300. Use it with --scene table"),
+        ("bowl --touches 300", 2, "--touches"),
         ("round.obj", 2, "--model is not given. Use a model of these objects and this probe"),
         (&format!("bowl --probe wide.toml --model {HOUSEHOLD}"), 1, "spacing 1.5 and 2"),
         (&format!("bowl --true-size stated --model {HOUSEHOLD}"), 2, "probe"),
         ("bowl --real noise=much", 2, "5ms"),
-        ("bowl --scene table --touches 4000", 2, "2 to 16 objects"),
+        ("bowl --scene table", 2, "2 to 16 objects"),
         (&format!("{table} --model {HOUSEHOLD}"), 2, "model"),
         (&format!("{table} --cone 30"), 2, "cone"),
         (&format!("{table} --real debounce=1ms"), 1, "noise"),

@@ -254,7 +254,7 @@ class Locator:
 
     >>> import palpate
     >>> probe = palpate.Probe(radius=1.5, spacing=15, speed=100, tilt=0, stroke=20)
-    >>> maps = palpate.Maps.of_meshes(["bowl", "mouse"], probe=probe, millimeters=10, approaches=10_000)
+    >>> maps = palpate.Maps.of_meshes(["bowl", "mouse"], probe=probe, millimeters=10)
     >>> locator = palpate.Locator(maps)
     >>> x, y, roll = locator.next()
     >>> located = locator.push_heights((None, 20.0, 17.0), x, y, roll, lowest=0.0)
@@ -313,7 +313,7 @@ class Maps:
 
     >>> import palpate
     >>> probe = palpate.Probe(radius=1.5, spacing=15, speed=100, tilt=0, stroke=20)
-    >>> maps = palpate.Maps.of_meshes(["bowl", "mouse"], probe=probe, millimeters=10, approaches=10_000)
+    >>> maps = palpate.Maps.of_meshes(["bowl", "mouse"], probe=probe, millimeters=10)
     >>> maps.objects
     ['bowl', 'mouse']
     >>> maps.placements[0]
@@ -349,7 +349,7 @@ class Maps:
     @staticmethod
     def learn(data: DataSet, *, real: Real | None = None, cell: SupportsFloat | SupportsIndex = 1.0, range: SupportsFloat | SupportsIndex = 30.0, error_rate: SupportsFloat | SupportsIndex = 0.01, max_touches: SupportsIndex = 25) -> Maps:
         """
-        Learns maps from touches with positions, simulated (`capture` with `position`) or recorded.
+        Learns maps from recorded touches with positions.
 
         `real` is what is known of hand and table, `cell` the side of a map's cells (1 or 2 mm), `range` half of the side of the
         square about the table's origin in which objects are looked for, in millimeters.
@@ -365,9 +365,10 @@ class Maps:
         The objects' names.
         """
     @staticmethod
-    def of_meshes(meshes: Meshes, *, probe: Probe, millimeters: SupportsFloat | SupportsIndex | None = None, approaches: SupportsIndex = 200000, real: Real | None = None, cell: SupportsFloat | SupportsIndex = 1.0, range: SupportsFloat | SupportsIndex = 30.0, error_rate: SupportsFloat | SupportsIndex = 0.01, max_touches: SupportsIndex = 25, seed: SupportsIndex = 1, progress: Progress | None = None) -> Maps:
+    def of_meshes(meshes: Meshes, *, probe: Probe, millimeters: SupportsFloat | SupportsIndex | None = None, real: Real | None = None, cell: SupportsFloat | SupportsIndex = 1.0, range: SupportsFloat | SupportsIndex = 30.0, error_rate: SupportsFloat | SupportsIndex = 0.01, max_touches: SupportsIndex = 25, progress: Progress | None = None) -> Maps:
         """
-        Maps of meshes, without a data set on the disk: each placement is touched in a simulation, then `learn` does the rest.
+        Maps of meshes in every pose that they rest in: what a fingertip meets in the middle of each cell. Poses that look the same to
+        contacts of this noise have one map.
 
         `meshes` are as for `capture`, at their true size: `millimeters` is the length of a unit of those that state none. The
         `probe` is in millimeters.
@@ -675,7 +676,7 @@ def calibrate(model: Model, rows: ArrayLike, labels: SupportsGetItem[int, str], 
     Sets a model's thresholds on sequences of rows, and returns the model and what `palpate calibrate --json` prints.
     """
 
-def capture(meshes: Meshes, *, touches: SupportsIndex = 21000, seed: SupportsIndex = 1, probe: Probe | None = None, approaches: bool | SupportsIndex = ..., pose: bool = False, aim: str = "box", cone: SupportsFloat | SupportsIndex | None = None, position: bool = False, within: SupportsFloat | SupportsIndex | None = None, length: SupportsFloat | SupportsIndex = 10.0, millimeters: SupportsFloat | SupportsIndex | None = None, instances: bool = False, samples: tuple[SupportsIndex, SupportsIndex] | None = None, out: str | PathLike[str] | None = None, force: bool = False, threads: SupportsIndex | None = None, progress: Progress | None = None) -> DataSet:
+def capture(meshes: Meshes, *, touches: SupportsIndex = 21000, seed: SupportsIndex = 1, probe: Probe | None = None, approaches: bool | SupportsIndex = ..., pose: bool = False, aim: str = "box", cone: SupportsFloat | SupportsIndex | None = None, length: SupportsFloat | SupportsIndex = 10.0, millimeters: SupportsFloat | SupportsIndex | None = None, instances: bool = False, samples: tuple[SupportsIndex, SupportsIndex] | None = None, out: str | PathLike[str] | None = None, force: bool = False, threads: SupportsIndex | None = None, progress: Progress | None = None) -> DataSet:
     """
     Touches objects with a simulated probe.
 
@@ -686,9 +687,7 @@ def capture(meshes: Meshes, *, touches: SupportsIndex = 21000, seed: SupportsInd
 
     `touches` full touches of each object are kept, or with `approaches=True` that many approaches whether fingers touch or not;
     `approaches=500` are 500 approaches. `pose` keeps the probe's direction and alignment. With `cone` the objects lie on a
-    table in each of their placements, and approaches come within that many degrees of straight down. `position` keeps where
-    the hand was, too, of all approaches
-    straight down to objects of true size on a table; `within` is how far from an object's middle they aim at most. The same
+    table in each of their placements, and approaches come within that many degrees of straight down. The same
     `seed` gives the same touches on any number of `threads`, and the same as the program's. `samples` are the first of
     a part of these touches or approaches, from 0, and the one after its last. With `instances` a directory inside a directory
     is one object. With `out` the touches are written there as `palpate capture` does: `force` is its option.

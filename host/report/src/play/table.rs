@@ -5,14 +5,13 @@ use crate::page::{html, scene};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, html};
-use palpate::capture::in_memory;
 use palpate::error::Result;
-use palpate::locate::{self, Real};
-use palpate::mesh::{Object, placements};
+use palpate::locate::{self, Real, Standing};
+use palpate::mesh::Object;
 use palpate::play::compress;
 use palpate::probe::noise::Noise;
 use palpate::progress::Progress;
-use palpate::touches::{Origin, Surroundings};
+use palpate::touches::Origin;
 use palpate::with;
 use palpate::wording::count;
 use palpate_shared::format::Length;
@@ -20,15 +19,14 @@ use palpate_shared::format::Length;
 /// Most objects on a table: a locator in a page has room for no more.
 pub const MOST_OBJECTS: usize = 16;
 
-/// The page of a table for at most [`MOST_OBJECTS`] objects at their true size, as HTML. Maps are learned from the origin's number of
-/// approaches to each object. The same objects and settings give the same page.
+/// The page of a table for at most [`MOST_OBJECTS`] objects at their true size, as HTML. The same objects and settings give the same
+/// page.
 ///
 /// # Errors
-/// Errors of [`surfaces()`], [`in_memory`], [`learn`](fn@locate::learn) and [`write`](fn@locate::write); for noise that a table does not have.
+/// Errors of [`surfaces()`], [`standing`](fn@locate::standing), [`cast`](fn@locate::cast) and [`write`](fn@locate::write); for noise that
+/// a table does not have.
 pub fn table(objects: &[Object], settings: &Settings, progress: &dyn Progress) -> Result<String> {
-    let scene = Surroundings::Table { cone: 0.0 };
-    let unit = Length::Millimeter;
-    let origin = Origin { scene, unit, position: true, pose: true, approaches: true, ..settings.origin.clone() };
+    let origin = Origin { unit: Length::Millimeter, ..settings.origin.clone() };
     let mut objects: Vec<&Object> = objects.iter().collect();
     // The order in which maps know them.
     objects.sort_by(|a, b| a.name.cmp(&b.name));
@@ -45,21 +43,21 @@ pub fn table(objects: &[Object], settings: &Settings, progress: &dyn Progress) -
     let shown: Vec<Object> = surfaces.iter().zip(&objects).map(own).collect();
     let real = Real::of(&settings.noise, origin.probe.speed)?;
     let maps = with!(locate::Settings::default(), fine = false).expecting(&real);
-    let (dataset, _) = in_memory(&shown, &origin.clone().into(), progress)?;
-    let learned = locate::learn(&dataset, &maps)?;
-    let bytes = locate::write(&learned, &dataset.names(), &origin.probe, &maps)?;
-    let on_table = |(surface, object): (&super::Surface, &Object)| -> Result<serde_json::Value> {
-        let found = placements::of_object(object)?.into_iter().flat_map(|found| found.placements);
-        Ok(serde_json::json!({
+    let standing = locate::standing(&shown.iter().collect::<Vec<_>>(), &origin.probe, maps.noise, progress)?;
+    let cast = locate::cast(&standing, &origin.probe, &maps)?;
+    let names: Vec<String> = standing.iter().map(|object| object.name.clone()).collect();
+    let bytes = locate::write(&cast, &names, &origin.probe, &maps)?;
+    let on_table = |(surface, object): (&super::Surface, &Standing)| {
+        serde_json::json!({
             "name": surface.name,
             "length": surface.length,
             "mesh": STANDARD.encode(&surface.packed),
-            "placements": found.map(|placement| serde_json::json!({
-                "name": placement.name,
-                "weight": placement.weight,
-                "rotation": placement.rotation.to_cols_array(),
+            "placements": object.looks().map(|(lying, share)| serde_json::json!({
+                "name": lying.name,
+                "weight": share,
+                "rotation": lying.rotation.to_cols_array(),
             })).collect::<Vec<_>>(),
-        }))
+        })
     };
     let data = serde_json::json!({
         "wasm": STANDARD.encode(WASM),
@@ -67,7 +65,7 @@ pub fn table(objects: &[Object], settings: &Settings, progress: &dyn Progress) -
         "aim": 0,
         "probe": origin.probe,
         "noise": Noise::default(),
-        "objects": surfaces.iter().zip(&shown).map(on_table).collect::<Result<Vec<_>>>()?,
+        "objects": surfaces.iter().zip(&standing).map(on_table).collect::<Vec<_>>(),
         "models": [],
         "maps": STANDARD.encode(compress(&bytes)),
         "real": [real.height, real.position, real.lost, real.drift, real.drift_yaw],
@@ -75,7 +73,7 @@ pub fn table(objects: &[Object], settings: &Settings, progress: &dyn Progress) -
         "reach": 2.0 * maps.range,
     });
     let body = html! {
-        (body(&surfaces, &origin, &maps, bytes.len(), learned.len(), &settings.command))
+        (body(&surfaces, &origin, &maps, bytes.len(), cast.len(), &settings.command))
         (html::data(&data))
         (scene::stage())
         (html::script(include_str!("game.js")))
@@ -91,7 +89,7 @@ fn body(
     origin: &Origin,
     maps: &locate::Settings,
     bytes: usize,
-    learned: usize,
+    cast: usize,
     command: &str,
 ) -> Markup {
     let reach = 2.0 * maps.range;
@@ -162,8 +160,7 @@ fn body(
                      rivals. The likeliest are shown."
                 }
                 p {
-                    "The maps were learned from " (count(usize::try_from(origin.touches).unwrap_or(usize::MAX))) " simulated approaches straight \
-                     down to each object: " (learned) " ways to lie, in cells of " (if maps.fine { 1 } else { 2 }) " mm, " (count(bytes)) " bytes. They expect heights to scatter by "
+                    "The maps are of the meshes: " (cast) " ways to lie, in cells of " (if maps.fine { 1 } else { 2 }) " mm, " (count(bytes)) " bytes. They expect heights to scatter by "
                     (maps.noise) " mm and " (100.0 * maps.lost) " % of contacts to be lost, and so the page's hand does. An object is named at a \
                      posterior of " (100.0 * (1.0 - maps.error_rate)) " %, which is a belief and not a calibrated promise."
                 }

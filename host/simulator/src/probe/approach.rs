@@ -217,12 +217,8 @@ impl Approach {
     /// Distance that the probe has moved when each finger first touches, in units; none for a finger that never does, or only
     /// after one of them has reached the table.
     pub fn distances(&self, scene: &Scene, probe: &Probe) -> [Option<f64>; FINGERS] {
-        self.above_table(self.each_distance(scene, probe), scene, probe)
-    }
-
-    /// Distances at which each finger touches the object, wherever the others are.
-    pub(super) fn each_distance(&self, scene: &Scene, probe: &Probe) -> [Option<f64>; FINGERS] {
-        self.fingers(probe.spacing).map(|finger| scene.first_contact(finger, self.direction, probe.radius))
+        let each = self.fingers(probe.spacing).map(|finger| scene.first_contact(finger, self.direction, probe.radius));
+        self.above_table(each, scene, probe)
     }
 
     /// Distances at which all three fingers touch, or none: as soon as one finger misses, no other is cast.
@@ -271,7 +267,7 @@ pub fn to_q15(cosine: f64) -> i16 {
 }
 
 /// The direction of the row of fingers: perpendicular to the motion, rolled uniformly about it, then tilted.
-pub(super) fn row(rng: &mut impl Rng, direction: DVec3, tilt: f64) -> DVec3 {
+fn row(rng: &mut impl Rng, direction: DVec3, tilt: f64) -> DVec3 {
     let across = direction.any_orthonormal_vector();
     let [roll_cos, roll_sin] = on_circle(rng);
     let row = across * roll_cos + direction.cross(across) * roll_sin;
@@ -280,7 +276,7 @@ pub(super) fn row(rng: &mut impl Rng, direction: DVec3, tilt: f64) -> DVec3 {
 }
 
 /// Uniform in [0, 1), of 53 bits.
-pub(super) fn unit(rng: &mut impl Rng) -> f64 {
+fn unit(rng: &mut impl Rng) -> f64 {
     rng.random()
 }
 

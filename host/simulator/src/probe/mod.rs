@@ -5,7 +5,6 @@
 //!   probe starts, in which direction it moves, how its row of fingers is turned. It gives the distance that each finger
 //!   travels, and from these distances a touch.
 //! - [`sweep`] finds the first contact of one sphere with the mesh: boxes, then a quick reject, then the exact time.
-//! - [`Approach::locate`] gives a touch with the hand's position, of an approach straight down to an object on a table.
 //! - [`hand`] says how far the hand goes, and which contacts it therefore never makes.
 //! - [`mod@file`] reads a probe from a TOML file, with what a real one adds; [`noise`] adds it to touches.
 //!
@@ -39,14 +38,12 @@
 pub mod approach;
 pub mod file;
 pub mod hand;
-mod located;
 pub mod noise;
 pub mod scene;
 pub mod sweep;
 pub mod unit;
 
 pub use approach::{Aim, Approach, Probe};
-pub use located::Located;
 pub use scene::{Scene, Table};
 
 /// The vectors in this room's signatures: [`DVec3`](glam::DVec3) for positions and directions, in units.

@@ -25,7 +25,6 @@ mod hull;
 #[cfg(feature = "objects")]
 mod implicit;
 mod in_order;
-mod located;
 mod noise;
 mod obj;
 mod partial_noise;

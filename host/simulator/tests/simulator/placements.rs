@@ -1,7 +1,7 @@
 use crate::samples::cuboid;
 use glam::{DMat3, DQuat, DVec3, Vec3};
 use palpate_simulator::mesh::Mesh;
-use palpate_simulator::mesh::placements::{Center, Placement, placements};
+use palpate_simulator::mesh::placements::{Center, Placement, placements, resting};
 use std::collections::BTreeMap;
 
 /// A solid of revolution about z, closed and right side out: radii at heights, from below.
@@ -213,4 +213,23 @@ fn vertices_that_differ_by_rounding_alone_leave_the_center_of_mass_that_of_the_v
     let [whole, apart] = [whole, apart].map(|mesh| placements(&mesh).unwrap());
     assert_eq!(apart.center, Center::OfVolume);
     assert_eq!(apart, whole);
+}
+
+#[test]
+fn poses_at_rest_are_those_of_the_hull_with_the_names_of_placements_first() {
+    for mesh in [bottle(), cuboid([1.0, 2.0, 3.0]), turned(&[[1.0, 0.0], [1.2, 1.0], [1.0, 2.0]], 20)] {
+        let (merged, all) = (placements(&mesh).unwrap(), resting(&mesh).unwrap());
+        let first: Vec<&Placement> = merged.placements.iter().chain(&merged.left_out).collect();
+        for (placement, own) in first.iter().zip(&all) {
+            assert_eq!((&own.name, own.rotation), (&placement.name, placement.rotation));
+            assert!(own.weight > 0.0 && own.weight <= 1.0);
+        }
+        assert!((all.iter().map(|pose| pose.weight).sum::<f64>() - 1.0).abs() < 1e-4);
+        assert!(all[first.len()..].windows(2).all(|two| two[0].weight >= two[1].weight));
+        let names: std::collections::BTreeSet<&str> = all.iter().map(|pose| pose.name.as_str()).collect();
+        assert_eq!(names.len(), all.len());
+    }
+    // Each facet that it lies on, and both ends.
+    assert_eq!(resting(&turned(&[[1.0, 0.0], [1.0, 2.0]], 24)).unwrap().len(), 26);
+    assert_eq!(resting(&cuboid([1.0, 2.0, 3.0])).unwrap().len(), 6);
 }

@@ -1,5 +1,3 @@
-mod located;
-
 use crate::fixtures::*;
 use palpate::capture::{Sampler, Settings, capture, in_memory, scenes, touches};
 use palpate::mesh::Instance;

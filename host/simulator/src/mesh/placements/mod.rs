@@ -39,6 +39,9 @@ pub const LEAST: f64 = 0.03;
 /// The second placement of an object is left out if it has less weight than this, regardless of the others.
 pub(crate) const LEAST_OF_TWO: f64 = 0.01;
 
+/// Directions that differ by at most this angle, in degrees, are of one face, up to rounding.
+const LEVEL: f64 = 0.1;
+
 /// Weights are whole multiples of one in this many, so that they are the same in every file.
 const PARTS: f64 = 1e6;
 
@@ -104,6 +107,41 @@ impl std::fmt::Display for Center {
 /// When the mesh has no triangles, a triangle names a vertex that is missing or not finite, or all vertices are at the
 /// same point.
 pub fn placements(mesh: &Mesh) -> Result<Placements> {
+    found(mesh).map(|(placements, _)| placements)
+}
+
+/// Every pose in which a mesh rests on its hull, by descending weight, none of them merged with another or left out. The ones of
+/// [`placements`] come first and have the names there, but their own weights; they go on with the next numbers. Cost: as for
+/// [`placements`].
+///
+/// # Errors
+/// Errors of [`placements`].
+pub fn resting(mesh: &Mesh) -> Result<Vec<Placement>> {
+    let (Placements { placements, left_out, .. }, settled) = found(mesh)?;
+    let mut rest = merged_by_direction(&settled, LEVEL);
+    let mut all: Vec<Placement> = Vec::with_capacity(rest.len());
+    for placement in placements.into_iter().chain(left_out) {
+        let off = |(up, _): &(DVec3, f64)| 1.0 - up.dot(placement.rotation.row(2));
+        let own = (0..rest.len()).min_by(|&a, &b| off(&rest[a]).total_cmp(&off(&rest[b])));
+        let weight = own.map_or(0.0, |own| rounded(rest.remove(own).1));
+        all.push(Placement { weight, ..placement });
+    }
+    for (up, weight) in rest {
+        let name = numbered(name(up), &all);
+        all.push(Placement { name, weight: rounded(weight), rotation: upright(up) });
+    }
+    Ok(all)
+}
+
+/// Number of the first placements that are kept of those with these weights, by descending weight: the others are rare.
+pub fn kept(weights: &[f64]) -> usize {
+    // A bottle stands less often than that if it is dropped, and yet it is a bottle that stands.
+    let at_least = |least: f64| weights.iter().filter(|weight| **weight >= least).count();
+    at_least(LEAST).max(at_least(LEAST_OF_TWO).min(2)).max(1).min(weights.len())
+}
+
+/// The placements of a mesh, and all directions that point up as it rests, with their weights.
+fn found(mesh: &Mesh) -> Result<(Placements, Vec<(DVec3, f64)>)> {
     mesh.check_faces()?;
     mesh.triangles.iter().flatten().try_for_each(|&index| mesh.vertex(index).map(drop))?;
     let mesh = mesh.welded();
@@ -122,10 +160,10 @@ pub fn placements(mesh: &Mesh) -> Result<Placements> {
     corners.iter_mut().flatten().for_each(|corner| *corner -= mass);
     at.iter_mut().for_each(|vertex| *vertex -= mass);
 
-    let mut found = merged_by_direction(&settled(&facets, &corners));
+    let settled = settled(&facets, &corners);
     let shape = Shape::new(&mesh, &at, longest * scale);
     let mut different: Vec<(DMat3, f64)> = Vec::new();
-    for (up, weight) in found.drain(..) {
+    for (up, weight) in merged_by_direction(&settled, SAME) {
         let rotation = upright(up);
         match different.iter_mut().find(|(other, _)| shape.is_alike(rotation, *other)) {
             Some((_, sum)) => *sum += weight,
@@ -134,7 +172,7 @@ pub fn placements(mesh: &Mesh) -> Result<Placements> {
     }
     // Equal weights stay in their order.
     different.sort_by(|a, b| rounded(b.1).total_cmp(&rounded(a.1)));
-    Ok(named(different, center))
+    Ok((named(different, center), settled))
 }
 
 /// The placements of each instance of an object, with the weights that the [object states](Object::placement_weights).
@@ -265,13 +303,13 @@ fn solid_angle([a, b, c]: [DVec3; 3]) -> f64 {
     2.0 * libm::atan2(a.dot(b.cross(c)), below).abs()
 }
 
-/// Directions within [`SAME`] of one of more weight become that one, which gets their weight; by descending weight.
-fn merged_by_direction(settled: &[(DVec3, f64)]) -> Vec<(DVec3, f64)> {
+/// Directions within some degrees of one of more weight become that one, which gets their weight; by descending weight.
+fn merged_by_direction(settled: &[(DVec3, f64)], degrees: f64) -> Vec<(DVec3, f64)> {
     let mut sorted = settled.to_vec();
     // Of equal weights, the one nearest to the mesh's own vertical is first.
     let key = |up: DVec3| [up.z, up.y, up.x].map(|along| (along * 1e4).round() as i64);
     sorted.sort_by(|a, b| rounded(b.1).total_cmp(&rounded(a.1)).then_with(|| key(b.0).cmp(&key(a.0))));
-    let near = libm::cos(SAME.to_radians());
+    let near = libm::cos(degrees.to_radians());
     let mut merged: Vec<(DVec3, f64)> = Vec::new();
     for (up, weight) in sorted {
         match merged.iter_mut().find(|(other, _)| other.dot(up) >= near) {
@@ -305,26 +343,27 @@ fn name(up: DVec3) -> String {
     ["x", "y", "z"].into_iter().zip(nearest).map(word).collect()
 }
 
+/// A name, with a number if placements have it already.
+fn numbered(name: String, all: &[Placement]) -> String {
+    match all.iter().filter(|other| other.name.split('.').next() == Some(&name)).count() {
+        0 => name,
+        count => format!("{name}.{}", count + 1),
+    }
+}
+
 fn rounded(weight: f64) -> f64 {
     (weight * PARTS).round() / PARTS
 }
 
-/// Names placements, leaves out the rare ones, and makes the weights of the others sum to 1.
+/// Names placements, leaves out rare ones, and makes the weights of the others sum to 1.
 fn named(different: Vec<(DMat3, f64)>, center: Center) -> Placements {
     let mut all: Vec<Placement> = Vec::with_capacity(different.len());
     for (rotation, weight) in different {
-        let base = name(rotation.row(2));
-        let same = |other: &&Placement| other.name.split('.').next() == Some(&base);
-        let name = match all.iter().filter(same).count() {
-            0 => base,
-            count => format!("{base}.{}", count + 1),
-        };
+        let name = numbered(name(rotation.row(2)), &all);
         all.push(Placement { name, weight: rounded(weight), rotation });
     }
-    // A bottle stands less often than that if it is dropped, and yet it is a bottle that stands.
-    let at_least = |least: f64| all.iter().filter(|placement| placement.weight >= least).count();
-    let kept = at_least(LEAST).max(at_least(LEAST_OF_TWO).min(2)).max(1).min(all.len());
-    let left_out = all.split_off(kept);
+    let weights: Vec<f64> = all.iter().map(|placement| placement.weight).collect();
+    let left_out = all.split_off(kept(&weights));
     share(&mut all);
     Placements { placements: all, left_out, center }
 }

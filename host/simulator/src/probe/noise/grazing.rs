@@ -36,22 +36,12 @@ impl Grazing {
         probe: &Probe,
         random: &mut impl Rng,
     ) -> [Option<f64>; FINGERS] {
-        approach.above_table(self.each_distance(approach, scene, probe, random), scene, probe)
-    }
-
-    /// Distances at which each finger touches the object, wherever the others are.
-    pub(in crate::probe) fn each_distance(
-        &self,
-        approach: &Approach,
-        scene: &Scene,
-        probe: &Probe,
-        random: &mut impl Rng,
-    ) -> [Option<f64>; FINGERS] {
-        approach.fingers(probe.spacing).map(|finger| {
+        let each = approach.fingers(probe.spacing).map(|finger| {
             let draw = Exp1.sample(random);
             let cast = [finger, approach.direction];
             self.distance(cast, &scene.contact(finger, approach.direction, probe.radius)?, draw, scene, probe)
-        })
+        });
+        approach.above_table(each, scene, probe)
     }
 
     /// Distance at which a finger touches that would do so at `contact` on its way from start in a direction; with an
