@@ -1,6 +1,6 @@
 //! Options and output of `palpate train` for recorded touches.
 
-use palpate::error::{Error, Place, Result, problem};
+use palpate::error::{Place, Result, problem};
 use palpate::teach::{Taught, TaughtObject};
 use palpate::touches::{Dataset, ObjectTouches, is_log};
 use std::fmt::Write as _;
