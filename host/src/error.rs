@@ -1,4 +1,3 @@
-//! Errors, with the place and a remedy. Each room has its own problems; one error holds any of them, and the place.
+//! One error: what is wrong, where, and what to do.
 
-pub use crate::locate::error::*;
 pub use palpate_simulator::error::*;

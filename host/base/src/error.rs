@@ -1,6 +1,5 @@
 //! One error: what is wrong, where, and what to do.
 
-use std::any::Any;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -91,6 +90,8 @@ pub enum Kind {
     Lost,
     /// Margins of a library do not belong to the rows or the outputs of the model that is compared with them.
     Margins,
+    /// A hand does not come straight down.
+    NotDown,
     /// A promise is not kept: too many are wrong at every threshold that was tested.
     NotKept,
     /// Nothing is recorded of something that a promise is for.
@@ -120,37 +121,12 @@ pub enum Kind {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Error(Box<Parts>);
 
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 struct Parts {
     kind: Kind,
     place: Place,
     what: String,
     fix: String,
-    variant: Option<std::sync::Arc<dyn Variant>>,
-}
-
-impl PartialEq for Parts {
-    fn eq(&self, other: &Self) -> bool {
-        (&self.kind, &self.place, &self.what, &self.fix) == (&other.kind, &other.place, &other.what, &other.fix)
-    }
-}
-
-/// To go: a variant of a room's enum of problems.
-pub trait Variant: std::error::Error + Any + Send + Sync {
-    /// Remedy, as a sentence.
-    fn fix(&self) -> String;
-}
-
-/// To go with the enums.
-impl<P: Variant> From<P> for Error {
-    fn from(problem: P) -> Self {
-        Self(Box::new(Parts {
-            what: problem.to_string(),
-            fix: problem.fix(),
-            variant: Some(std::sync::Arc::new(problem)),
-            ..Parts::default()
-        }))
-    }
 }
 
 /// An [`Error`] of kind [`Kind::Input`] that says what is wrong, in the words of [`format!`], without a full stop.
@@ -173,16 +149,6 @@ impl Error {
     /// Something is wrong with what was given.
     pub fn new(what: impl Into<String>) -> Self {
         Self(Box::new(Parts { what: what.into(), ..Parts::default() }))
-    }
-
-    /// To go with the enums.
-    pub fn variant_at(place: Place, problem: impl Variant) -> Self {
-        Self::from(problem).at(place)
-    }
-
-    /// To go with the enums.
-    pub fn problem<P: Variant>(&self) -> Option<&P> {
-        (self.0.variant.as_deref()? as &dyn Any).downcast_ref()
     }
 
     /// The setting `name` is `value`, which is not among what is `allowed` ("1 to 10000").

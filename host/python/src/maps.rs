@@ -10,7 +10,7 @@ use crate::recognizer::numbers;
 use crate::work::{Callback, long};
 use palpate::calibrate::{self, Per};
 use palpate::compile;
-use palpate::error::{Error, LocateProblem, Place};
+use palpate::error::Error;
 use palpate::locate::{self, Aimed, Approach, Hand, Heights, MapsFile, Promised, Seen, Settings, Terms, Until};
 use palpate::mesh::Object;
 use palpate::mesh::facts::sides;
@@ -45,7 +45,7 @@ pub(crate) struct Maps {
 impl Maps {
     fn of(bytes: Vec<u8>) -> palpate::Result<Self> {
         let opened = OpenedMaps::try_new(bytes, |bytes| {
-            locate::Maps::new(bytes).map_err(|error| Error::from(LocateProblem::Refused { error }))
+            locate::Maps::new(bytes).map_err(locate::refused)
         })?;
         Ok(Self { opened: Arc::new(opened) })
     }
@@ -140,8 +140,7 @@ impl Maps {
     fn load(py: Python<'_>, path: PathBuf) -> Result<Self, Failure> {
         Ok(py.detach(|| {
             std::fs::metadata(&path).map_err(|source| Error::io(&path, "read the maps", source))?;
-            let trees = || Error::variant_at(Place::File(path.clone()), LocateProblem::Trees);
-            let file = MapsFile::read(&path)?.ok_or_else(trees)?;
+            let file = MapsFile::read(&path)?.ok_or_else(|| locate::not_maps().in_file(&path))?;
             Self::of(file.maps().model().to_vec())
         })?)
     }
@@ -459,7 +458,7 @@ impl Locator {
         let stopping = compile::stopping(error_rate.unwrap_or(own.error_rate()), limit)?;
         let stopping = if error_rate.is_none() { own.with_max_touches(limit) } else { stopping };
         let within = locate::workspace(&maps, workspace)?;
-        let hand = Hand::of(&maps).ok_or(Error::from(LocateProblem::NoHand))?;
+        let hand = Hand::of(&maps).ok_or_else(locate::no_hand)?;
         let mut cell = OpenedLocator::new(Arc::clone(opened), |opened| {
             locate::locating(*opened.borrow_dependent(), stopping, None)
         });

@@ -2,7 +2,7 @@
 
 use crate::follow::{Following, Placed, Step};
 use crate::wire::{self, PoseWithCovariance};
-use palpate::error::LocateProblem;
+use palpate::error::Kind;
 use palpate::locate::{self, Approach, Hand, Locating, MapsFile, POSE, Pose};
 use palpate::onboard::shared::Touch as Felt;
 use palpate::onboard::{Stopping, Verdict as Decision};
@@ -36,7 +36,7 @@ impl Placing {
     /// # Errors
     /// The maps do not state their hand.
     pub(crate) fn new(maps: Arc<MapsFile>, stopping: Stopping) -> Result<Self, String> {
-        let hand = Hand::of(&maps.maps()).ok_or_else(|| LocateProblem::NoHand.to_string())?;
+        let hand = Hand::of(&maps.maps()).ok_or_else(|| locate::no_hand().what().to_owned())?;
         let opened = Opened::new(maps, |file| locate::locating(file.maps(), stopping, None));
         let mut placing = Self { opened, hand, seed: 0, next: Approach::default() };
         placing.begin(None);
@@ -71,15 +71,15 @@ impl Following for Placing {
 
     fn push(&mut self, felt: &Felt) -> Result<(), String> {
         let seen = locate::seen(&self.hand, felt).map_err(|problem| {
-            let remedy = match problem {
-                LocateProblem::Nowhere => {
+            // The library's remedies are in millimeters.
+            let remedy = match problem.kind() {
+                Kind::NotDown => "a model of maps needs a direction whose z is at most -0.95",
+                _ if felt.position().is_none() => {
                     "a model of maps needs has_pose and has_position, with direction, alignment, and position in meters"
                 }
-                LocateProblem::Far { .. } => "give position in meters, in a frame whose origin is on the table",
-                LocateProblem::Below { .. } => "give times in seconds, and position in meters above the table",
-                _ => "a model of maps needs a direction whose z is at most -0.95",
+                _ => "give times in seconds, and position in meters above the table, in a frame whose origin is on it",
             };
-            format!("{problem}: {remedy}")
+            format!("{}: {remedy}", problem.what())
         })?;
         self.next = self.opened.with_dependent_mut(|file, locating| {
             locating.push(seen);

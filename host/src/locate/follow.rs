@@ -1,9 +1,8 @@
 //! A located approach as a step of evidence, and an object's cells as a follower.
 
-use super::error::LocateProblem;
 use super::stated::reachable;
 use super::world::{Aimed, Drawn, Truth};
-use crate::error::{Error, Result};
+use crate::error::{Error, Kind, Result, problem};
 use crate::evidence::{Follower, Sequence, Sequences, Supplier};
 use palpate_onboard::locate::{Approach, AtMost, Effort, Hand, Locator, Maps, Pose, Seen};
 use palpate_onboard::{Familiarity, Stopping, Verdict};
@@ -22,18 +21,36 @@ pub const BELOW: f64 = 15.0;
 /// Heights that a touch met.
 ///
 /// # Errors
-/// [`LocateProblem::Nowhere`] without a position, [`LocateProblem::Far`] and [`LocateProblem::Below`] for one that cannot be of a
-/// hand above a table, and [`LocateProblem::NotDown`].
-pub fn seen(hand: &Hand, touch: &Touch) -> Result<Seen, LocateProblem> {
-    let position = touch.position().ok_or(LocateProblem::Nowhere)?;
+/// When the touch has no position, or one that cannot be of a hand above a table; [`Kind::NotDown`].
+pub fn seen(hand: &Hand, touch: &Touch) -> Result<Seen> {
+    let position = touch.position().ok_or_else(nowhere)?;
     reachable(["x", "y", "z"].into_iter().zip(position.micrometers.map(|micrometers| f64::from(micrometers) / 1e3)))?;
     let last = touch.times().iter().filter_map(|time| time.micros()).max().unwrap_or(0);
     let way = f64::from(last) * 1e-6 * f64::from(hand.speed) / 1e3;
     let below = way - f64::from(position.micrometers[2]) / 1e3;
     if below > BELOW {
-        return Err(LocateProblem::Below { millimeters: below });
+        return Err(too_low(below));
     }
-    hand.seen(touch).ok_or(LocateProblem::NotDown)
+    hand.seen(touch).ok_or_else(not_down)
+}
+
+/// The problem of a touch without a position.
+pub(super) fn nowhere() -> Error {
+    problem!("the touch has no position")
+        .fix("Give twelve columns: times, direction, alignment, and the hand's position in millimeters.")
+}
+
+/// The problem of a finger that stopped below the table.
+pub(super) fn too_low(millimeters: f64) -> Error {
+    problem!("a finger stopped {millimeters:.0} mm below the table")
+        .fix("Give times in seconds, and the position in millimeters above the table.")
+}
+
+/// The problem of a hand that comes from another direction.
+pub(super) fn not_down() -> Error {
+    problem!("it does not come straight down")
+        .fix("Come straight down, and state the direction in the table's frame: its z is at most -0.95.")
+        .as_kind(Kind::NotDown)
 }
 
 /// A locator of the host: with a chip's room for up to 16 objects, with more for more.

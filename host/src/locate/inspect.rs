@@ -1,7 +1,7 @@
 //! Content of a model of maps, and its file.
 
-use super::error::LocateProblem;
 use super::follow::{CELLS, TOUCHES};
+use super::write::{no_hand, refused};
 use super::{Aimed, Effort, Hand, Maps, Real};
 use crate::calibrate;
 use crate::error::{Error, Place, Result};
@@ -22,7 +22,7 @@ impl MapsFile {
     /// Reads a model of maps; none for a file that is not one, such as a model of trees, and for a pipe, which cannot be read twice.
     ///
     /// # Errors
-    /// [`LocateProblem::Refused`] for a model of maps that is damaged.
+    /// When the file cannot be read, or a model of maps is damaged.
     pub fn read(path: &Path) -> Result<Option<Self>> {
         let is_file = std::fs::metadata(path).is_ok_and(|about| about.is_file());
         let Some(file) = is_file.then(|| std::fs::File::open(path).ok()).flatten() else { return Ok(None) };
@@ -35,7 +35,7 @@ impl MapsFile {
         (&file).read_to_end(&mut bytes).map_err(failed)?;
         match Maps::new(&bytes) {
             Ok(_) => Ok(Some(Self(bytes))),
-            Err(error) => Err(Error::variant_at(Place::file(path), LocateProblem::Refused { error })),
+            Err(error) => Err(refused(error).at(Place::file(path))),
         }
     }
 
@@ -53,9 +53,9 @@ pub fn names(maps: &Maps<'_>) -> Vec<String> {
 /// The probe that maps were learned with, in millimeters.
 ///
 /// # Errors
-/// [`LocateProblem::NoHand`].
+/// When the maps state no hand.
 pub fn hand(maps: &Maps<'_>) -> Result<Probe> {
-    let stated = Hand::of(maps).and(maps.probe()).ok_or(LocateProblem::NoHand)?;
+    let stated = Hand::of(maps).and(maps.probe()).ok_or_else(no_hand)?;
     let TrainedProbe { radius, spacing, speed, stroke, travel, stroke_tolerance, .. } = stated;
     // Decimals of a file are not those of its rounding to f32.
     let exact = |length: f32| length.to_string().parse().unwrap_or(f64::from(length));
@@ -197,7 +197,7 @@ const EACH: u64 = 160;
 /// Content of a model of maps, and the cost of an approach for a chip with room for 16 objects.
 ///
 /// # Errors
-/// [`LocateProblem::NoHand`].
+/// When the maps state no hand.
 pub fn inspect<'m>(maps: &Maps<'m>) -> Result<Inspected<'m>> {
     let stopping = maps.stopping();
     let header = Header::of(maps.model());

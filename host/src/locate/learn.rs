@@ -1,10 +1,11 @@
 //! Maps of placements: cast at meshes, or learned from recorded touches with positions.
 
-use super::error::LocateProblem;
 use super::register::recorded;
+use super::shape::not_met;
 use super::surface::{SAME, Surface, TABLE};
+use super::write::too_large;
 use super::{Settings, Standing};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, problem};
 use crate::probe::approach::Probe;
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_shared::Touch;
@@ -21,18 +22,18 @@ const MOST: i32 = 250;
 /// Cost: a cast for each cell.
 ///
 /// # Errors
-/// [`LocateProblem`] for an object that is too large for a map, or too flat to be felt.
+/// When an object is too large for a map, or too flat to be felt.
 pub fn cast(standing: &[Standing], probe: &Probe, settings: &Settings) -> Result<Vec<Surface>> {
     let of = |(object, stands): (usize, &Standing)| {
         let looks: Vec<_> = stands.looks().collect();
         let cast = |&(lying, share): &(&super::Lying, f64)| {
             let placement = lying.name.clone();
             if lying.half().truncate().max_element() + probe.radius > f64::from(MOST) * settings.cell() {
-                return Err(LocateProblem::Large { object: stands.name.clone(), placement }.into());
+                return Err(too_large(&stands.name, &placement));
             }
             let surface = Surface::cast(lying, probe.radius, settings.cell());
             if surface.top() <= TABLE {
-                return Err(LocateProblem::NotMet { object: stands.name.clone(), placement }.into());
+                return Err(not_met(&stands.name, &placement));
             }
             Ok(Surface { object, placement, share, is_round: surface.looks_round(), ..surface })
         };
@@ -44,7 +45,7 @@ pub fn cast(standing: &[Standing], probe: &Probe, settings: &Settings) -> Result
 /// Learns the maps of recorded objects. Equal placements of an object become one.
 ///
 /// # Errors
-/// [`LocateProblem`] if touches have no position, or the probe is not in millimeters, or an object was not met.
+/// When touches have no position, the probe is not in millimeters, or an object was not met.
 pub fn learn(dataset: &Dataset, settings: &Settings) -> Result<Vec<Surface>> {
     let probe = probe_of(dataset)?;
     let of = |(object, touches)| of_object(object, touches, &probe, settings);
@@ -53,7 +54,8 @@ pub fn learn(dataset: &Dataset, settings: &Settings) -> Result<Vec<Surface>> {
 
 fn of_object(object: usize, touches: &ObjectTouches, probe: &Probe, settings: &Settings) -> Result<Vec<Surface>> {
     if let Some(touch) = touches.touches().iter().position(|touch| touch.position().is_none()) {
-        return Err(LocateProblem::NoPosition { object: touches.name.clone(), touch: touch + 1 }.into());
+        return Err(problem!("{}: touch {} has no position", touches.name, touch + 1)
+            .fix("State the position of every touch, or of none: the last three columns of a line."));
     }
     let placements = touches.placement_weights().unwrap_or_else(|| vec![(String::new(), 1.0)]);
     let by_source = touches.by_source();
@@ -65,11 +67,9 @@ fn of_object(object: usize, touches: &ObjectTouches, probe: &Probe, settings: &S
             .filter(is_own)
             .map(|source| by_source[source].iter().map(|touch| touches.touches()[*touch]).collect())
             .collect();
-        let named = |problem: Error| match problem.problem() {
-            Some(LocateProblem::NotMet { object, .. }) => {
-                LocateProblem::NotMet { object: object.clone(), placement: placement.clone() }.into()
-            }
-            _ => problem,
+        let named = |error: Error| match placement.is_empty() {
+            true => error,
+            false => error.within(format_args!("{placement}: ")),
         };
         for surface in recorded(&touches.name, &recordings, probe, settings).map_err(named)? {
             let named = Surface {
@@ -93,9 +93,11 @@ fn of_object(object: usize, touches: &ObjectTouches, probe: &Probe, settings: &S
 /// The probe of a data set, at true size.
 ///
 /// # Errors
-/// [`LocateProblem::Unit`] unless it states one in millimeters.
+/// Unless it states one in millimeters.
 pub fn probe_of(dataset: &Dataset) -> Result<Probe> {
     let origin = dataset.origin.as_ref();
-    let origin = origin.filter(|origin| origin.unit == Length::Millimeter).ok_or(LocateProblem::Unit)?;
+    let origin = origin.filter(|origin| origin.unit == Length::Millimeter).ok_or_else(|| {
+        problem!("the touches are not of objects at their true size").fix("State the probe in millimeters (--probe).")
+    })?;
     Ok::<_, Error>(origin.probe)
 }

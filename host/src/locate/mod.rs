@@ -11,7 +11,6 @@
 //! objects on a simulated table, chosen or at random.
 
 mod contacts;
-pub(crate) mod error;
 mod follow;
 mod grid;
 mod inspect;
@@ -45,7 +44,7 @@ pub use surface::Surface;
 #[cfg(feature = "train")]
 pub use table::{BareTable, Measured, REACH, bare_table};
 pub use world::{Aimed, Drawn, Real, Standing, Truth, World, standing};
-pub use write::write;
+pub use write::{no_hand, not_maps, refused, write};
 
 use crate::error::{Error, Result};
 

@@ -1,13 +1,13 @@
 //! Thresholds that keep a promise about located objects, and their test.
 
-use super::error::LocateProblem;
 use super::follow::{Pressed, Pressing};
 use super::pose::{Equivalents, Off, Until};
 use super::world::{Aimed, Drawn, Real, Standing, World};
 use super::write::{Restated, restated};
+use super::write::{no_hand, refused};
 use super::{Effort, Hand, Maps, Promised, Seen, TESTED, locating};
 use crate::calibrate::{self, Begin, Chosen, Stop, Way, margin_of, odds_of, promise};
-use crate::error::{Error, Result};
+use crate::error::{Error, Kind, Result, problem};
 use crate::evaluate::Finding;
 use crate::evidence::{self, Follower, Given, Limit, Outcome, Sequence, Totals};
 use crate::probe::approach::Probe;
@@ -109,12 +109,19 @@ impl LeftOut {
     /// Results of sequences.
     ///
     /// # Errors
-    /// [`LocateProblem::Untold`], if less than half of them ended as unknown.
-    fn of(each: &[Played]) -> Result<Self, LocateProblem> {
+    /// If less than half of them ended as unknown.
+    fn of(each: &[Played]) -> Result<Self> {
         let (unknown, sequences) = (each.iter().filter(|played| played.outcome.unknown).count(), each.len());
         let named = each.iter().filter(|played| played.outcome.recognized.is_some()).count();
         let found = Self { sequences, unknown, named };
-        if 2 * unknown < sequences { Err(LocateProblem::Untold { sequences, unknown }) } else { Ok(found) }
+        if 2 * unknown < sequences {
+            return Err(problem!(
+                "a test for unknown objects is worth little here: of {sequences} sequences of objects that were left out in turn, \
+                 {unknown} ended as unknown"
+            )
+            .fix("Make maps for less noise or of smaller cells, or calibrate without the test."));
+        }
+        Ok(found)
     }
 }
 
@@ -133,13 +140,19 @@ impl ToPlace {
     /// Results of sequences; none unless places were asked for.
     ///
     /// # Errors
-    /// [`LocateProblem::NeverPlaced`], if less than half of the objects that were named rightly have a sure place.
-    fn of(each: &[Played], terms: &Terms) -> Result<Option<Self>, LocateProblem> {
+    /// If less than half of the objects that were named rightly have a sure place.
+    fn of(each: &[Played], terms: &Terms) -> Result<Option<Self>> {
         let Some(until) = terms.until else { return Ok(None) };
         let right = each.iter().filter(|played| played.is_right).count();
         let placed = each.iter().filter(|played| played.in_intervals.is_some()).count();
         if 2 * placed < right {
-            return Err(LocateProblem::NeverPlaced { right, placed, until, approaches: terms.max_touches });
+            return Err(problem!(
+                "of {right} objects that were named rightly only {placed} had a place as sure as {} mm and {}° within {} approaches",
+                until.millimeters,
+                until.degrees,
+                terms.max_touches
+            )
+            .fix("Ask for less, such as 3 mm and 5 degrees, or allow more approaches."));
         }
         let approaches: usize = each.iter().map(|played| played.outcome.approaches).sum();
         Ok(Some(Self { right, placed, mean_approaches: approaches as f64 / each.len().max(1) as f64 }))
@@ -214,7 +227,7 @@ pub struct OfObject {
 /// approaches the place takes.
 ///
 /// # Errors
-/// [`LocateProblem`] for maps without a hand, objects that they do not know, and places that never become sure;
+/// When maps have no hand, objects are not theirs, or places never become sure;
 /// [`Kind::NotKept`](crate::error::Kind::NotKept) or [`Kind::TooFew`](crate::error::Kind::TooFew) if no threshold keeps the
 /// promise.
 pub fn calibrate(
@@ -263,14 +276,16 @@ pub fn calibrate(
     Ok(Calibrated { until, strangers, ..calibrated })
 }
 
+const ALL: &str = "Give the objects that the model was trained on, all of them and no others.";
+
 /// Refuses objects that are not those of the maps.
-fn check_all<'o>(maps: Maps<'_>, objects: impl Iterator<Item = &'o String>) -> Result<(), LocateProblem> {
+fn check_all<'o>(maps: Maps<'_>, objects: impl Iterator<Item = &'o String>) -> Result<()> {
     let (names, objects) = (super::names(&maps), objects.collect::<Vec<_>>());
     if let Some(object) = names.iter().find(|name| !objects.contains(name)) {
-        return Err(LocateProblem::Missing { object: object.clone() });
+        return Err(problem!("{object} is not among the objects to calibrate on").fix(ALL));
     }
     match objects.into_iter().find(|object| !names.contains(object)) {
-        Some(object) => Err(LocateProblem::Unknown { object: object.clone() }),
+        Some(object) => Err(problem!("the model does not know {object}").fix(ALL)),
         None => Ok(()),
     }
 }
@@ -290,7 +305,7 @@ pub fn calibrate_recorded(
 ) -> Result<Calibrated> {
     terms.check()?;
     check_all(maps, recorded.objects.iter().map(|object| &object.name))?;
-    let hand = Hand::of(&maps).ok_or(LocateProblem::NoHand)?;
+    let hand = Hand::of(&maps).ok_or_else(no_hand)?;
     let plain = Restated { odds: 0, max_touches: terms.max_touches, least_fits: Vec::new(), stretch: 0, promise: None };
     let bytes = restated(maps, &plain)?;
     let (plain_maps, names) = (opened(&bytes)?, super::names(&maps));
@@ -299,7 +314,7 @@ pub fn calibrate_recorded(
     let of = |(index, (touches, pool)): (u64, (&ObjectTouches, Pool))| -> Result<Vec<Sequence>> {
         progress::advance(progress, 1)?;
         let is_down = |touch: &u32| match super::seen(&hand, &touches.touches()[*touch as usize]) {
-            Err(LocateProblem::NotDown) => Ok(None),
+            Err(error) if error.is(&Kind::NotDown) => Ok(None),
             seen => seen.map(Some),
         };
         let mut steps = pool.touches.iter().map(is_down).collect::<Result<Vec<_>, _>>()?;
@@ -380,7 +395,7 @@ fn strictest(terms: &Terms) -> f64 {
 const ALARMS: f64 = 0.01;
 
 fn opened(bytes: &[u8]) -> Result<Maps<'_>> {
-    Ok(Maps::new(bytes).map_err(|error| LocateProblem::Refused { error })?)
+    Maps::new(bytes).map_err(refused)
 }
 
 /// Limit of the fit for each object: while it leads, all but a share of its own sequences stay above it from the touch on at which a
@@ -587,7 +602,7 @@ struct Setup<'s> {
 
 impl<'s> Setup<'s> {
     fn new(maps: Maps<'s>, standing: &'s [Standing], probe: &'s Probe, terms: &'s Terms) -> Result<Self> {
-        let hand = Hand::of(&maps).ok_or(LocateProblem::NoHand)?;
+        let hand = Hand::of(&maps).ok_or_else(no_hand)?;
         let range = f64::from(maps.range()) / 1_000.0;
         // A placement's origin stays within the range, with a cell to spare.
         let world = World { standing, probe, real: terms.real, range: range - 1.0, seed: terms.seed };

@@ -35,7 +35,7 @@ type Placed = [f64; 3];
 /// The surfaces of an object's recordings: one for those whose places relative to each other are sure, and one for each of the rest.
 ///
 /// # Errors
-/// [`LocateProblem::NotMet`](super::error::LocateProblem::NotMet), and [`samples`](super::samples).
+/// Errors of [`samples`](super::samples), and when no touch met the object.
 pub(super) fn recorded(
     name: &str,
     recordings: &[Vec<Touch>],

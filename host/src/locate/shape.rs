@@ -1,11 +1,11 @@
 //! The heights of one object that stands still: what is known of them, what is guessed, and where to touch next.
 
 use super::contacts::{Met, tips};
-use super::error::LocateProblem;
+use super::follow::nowhere;
 use super::follow::seen;
 use super::grid::{connected, index, pieces, places};
 use super::{Approach, Hand, Lying, Standing};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, problem};
 use crate::mesh::Mesh;
 use crate::probe::approach::{FINGERS, Probe};
 use crate::probe::scene::Scene;
@@ -49,15 +49,25 @@ pub struct Sample {
     pub is_contact: bool,
 }
 
+/// The problem of an object, or of its placement where there is one, that no touch met.
+pub(super) fn not_met(object: &str, placement: &str) -> Error {
+    problem!("{object}: no touch met it{}", in_placement(placement)).fix("Touch it, or leave it out.")
+}
+
+/// The placement in words, if there is one.
+pub(super) fn in_placement(placement: &str) -> String {
+    if placement.is_empty() { String::new() } else { format!(" in the placement {placement:?}") }
+}
+
 /// Samples of a touch of a probe in millimeters. A missing finger met nothing within the stroke, or its contact was lost.
 ///
 /// # Errors
-/// [`LocateProblem`], the ones of [`seen`](super::seen).
-pub fn samples(touch: &Touch, probe: &Probe) -> Result<[Sample; FINGERS], LocateProblem> {
+/// Errors of [`seen`](super::seen).
+pub fn samples(touch: &Touch, probe: &Probe) -> Result<[Sample; FINGERS]> {
     let micrometers = |millimeters: f64| (millimeters * 1e3) as u32;
     let stroke = probe.stroke.map(micrometers);
     seen(&Hand { spacing: micrometers(probe.spacing), speed: micrometers(probe.speed), stroke }, touch)?;
-    let tips = tips(touch, probe).ok_or(LocateProblem::Nowhere)?;
+    let tips = tips(touch, probe).ok_or_else(nowhere)?;
     let (times, down) = (touch.times(), if touch.is_empty() { 0.0 } else { probe.stroke.unwrap_or(f64::INFINITY) });
     Ok(std::array::from_fn(|finger| {
         let Met { x, y, height } = tips[finger];
@@ -96,12 +106,11 @@ impl Shape {
     /// part of the relief: contacts that stray above the table have no say in it.
     ///
     /// # Errors
-    /// [`LocateProblem::NotMet`] with this name, if no contact is clearly above the table.
+    /// When no contact is clearly above the table, with this name.
     pub fn of(samples: Vec<Sample>, probe: &Probe, noise: f64, name: &str) -> Result<Self> {
         let least = OBJECT.max(3.0 * noise);
         let is_object = |sample: &&Sample| sample.is_contact && sample.height > least;
-        let all = ends(samples.iter().filter(is_object))
-            .ok_or_else(|| LocateProblem::NotMet { object: name.into(), placement: String::new() })?;
+        let all = ends(samples.iter().filter(is_object)).ok_or_else(|| not_met(name, ""))?;
         let shape = Self { probe: *probe, noise, middle: [0.0; 2], half: [0.0; 2], samples }.about(all, all);
         let relief = shape.relief();
         let raised = places(relief.half).zip(&relief.heights).filter(|(_, height)| **height > least);
@@ -128,8 +137,8 @@ impl Shape {
     /// Takes in a touch.
     ///
     /// # Errors
-    /// [`LocateProblem`], the ones of [`samples`].
-    pub fn push(&mut self, touch: &Touch) -> Result<(), LocateProblem> {
+    /// Errors of [`samples`].
+    pub fn push(&mut self, touch: &Touch) -> Result<()> {
         self.add(samples(touch, &self.probe)?);
         Ok(())
     }

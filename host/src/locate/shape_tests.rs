@@ -2,7 +2,6 @@
 
 use super::register::recorded;
 use super::*;
-use crate::error::LocateProblem;
 use crate::mesh::{Mesh, Object};
 use crate::probe::approach::Probe;
 use crate::touches::{Dataset, ObjectTouches, Origin, Source};
@@ -252,6 +251,5 @@ fn a_touch_without_a_position_is_named() {
     touches[1] = Touch::new([ContactTime::MISSING; 3]);
     let pot = dataset(vec![ObjectTouches::new("pot", touches, Source::Object)]);
     let error = learn(&pot, &Settings::default()).unwrap_err();
-    let expected = LocateProblem::NoPosition { object: "pot".into(), touch: 2 };
-    assert_eq!(error.problem::<LocateProblem>(), Some(&expected));
+    assert_eq!(error.what(), "pot: touch 2 has no position");
 }

@@ -1,10 +1,10 @@
 //! Approaches as numbers, and their limits: the same for touches of a file and for heights of a program.
 
-use super::error::LocateProblem;
 use super::follow::BELOW;
+use super::follow::too_low;
 use super::shape::Sample;
 use super::{Hand, Seen};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, problem};
 use crate::touches::touch_of_seconds;
 use palpate_onboard::locate::Contact;
 
@@ -28,7 +28,7 @@ impl Heights {
     /// The approach of a hand, for a locator.
     ///
     /// # Errors
-    /// [`LocateProblem::Far`], [`LocateProblem::Below`], or the problem of a row that is no unit vector.
+    /// A place or height that is too far from the table's origin or below the table, and a row that is no unit vector.
     pub fn seen(&self, hand: &Hand) -> Result<Seen> {
         self.check()?;
         let micrometers = |millimeters: f64| (millimeters * 1e3).round() as i32;
@@ -59,7 +59,7 @@ impl Heights {
         let stated = [("x", x), ("y", y), ("lowest", self.lowest)].into_iter();
         reachable(stated.chain(heights.clone().map(|height| ("a height", height))))?;
         if let Some(height) = heights.into_iter().find(|height| *height < -BELOW) {
-            return Err(LocateProblem::Below { millimeters: -height }.into());
+            return Err(too_low(-height));
         }
         touch_of_seconds([None; 3], Some([0.0, 0.0, -1.0]), Some(self.row)).map_err(Error::from)?;
         Ok(())
@@ -67,9 +67,12 @@ impl Heights {
 }
 
 /// Refuses places and heights in millimeters that no locator keeps.
-pub(super) fn reachable(stated: impl IntoIterator<Item = (&'static str, f64)>) -> Result<(), LocateProblem> {
+pub(super) fn reachable(stated: impl IntoIterator<Item = (&'static str, f64)>) -> Result<()> {
     match stated.into_iter().find(|(_, millimeters)| millimeters.is_nan() || millimeters.abs() > FARTHEST) {
-        Some((what, millimeters)) => Err(LocateProblem::Far { what, millimeters }),
+        Some((what, millimeters)) => Err(problem!(
+            "{what} is {millimeters} mm, and places and heights are at most {FARTHEST} mm from the table's origin"
+        )
+        .fix("State it in millimeters, in a frame whose origin is on the table.")),
         None => Ok(()),
     }
 }

@@ -2,8 +2,8 @@
 
 use super::Hand;
 use super::contacts::{Met, tips};
-use super::error::LocateProblem;
-use crate::error::{Error, Place, Result};
+use super::follow::{not_down, nowhere};
+use crate::error::{Error, Place, Result, problem};
 use crate::probe::approach::{FINGERS, Probe};
 use nalgebra::{SMatrix, SVector};
 use palpate_shared::Touch;
@@ -78,14 +78,13 @@ impl Contact {
 /// presses, since the three fingers share an error of the hand's position.
 ///
 /// # Errors
-/// With the place of the press: [`LocateProblem::Nowhere`], [`LocateProblem::NotDown`], and [`LocateProblem::NotBare`] if more than
-/// a quarter of the contacts are with something else. [`LocateProblem::FewPresses`]; [`LocateProblem::OnePlace`];
-/// [`LocateProblem::Slanted`].
+/// With the place of the press: a touch without a position, [`Kind::NotDown`], and more than a quarter of the contacts with
+/// something else. When there are too few presses, their places do not show the slope of the table, or it is not level.
 pub fn bare_table(presses: &[(Place, Touch)], probe: &Probe) -> Result<BareTable> {
     let contacts = contacts(presses, probe)?;
     let mut all: Vec<f64> = contacts.iter().map(|contact| contact.height).collect();
     let mut found = Numbers::zeros();
-    found[0] = median(&mut all).ok_or(LocateProblem::FewPresses { finger: 1, presses: 0, least: LEAST_PRESSES })?;
+    found[0] = median(&mut all).ok_or_else(|| few_presses(1, 0))?;
     let (mut kept, mut inverse, mut limit) = (Vec::new(), Square::zeros(), NEAR);
     for _ in 0..10 {
         kept = contacts.iter().filter(|contact| contact.off(&found).abs() <= limit).collect();
@@ -98,7 +97,7 @@ pub fn bare_table(presses: &[(Place, Touch)], probe: &Probe) -> Result<BareTable
                 .into_iter()
                 .all(|slope| inverse[(slope, slope)].sqrt() * super::Settings::default().noise * REACH <= BEARABLE)
         };
-        inverse = normal.try_inverse().filter(is_certain).ok_or(LocateProblem::OnePlace)?;
+        inverse = normal.try_inverse().filter(is_certain).ok_or_else(one_place)?;
         found = inverse * moment;
         let mut off: Vec<f64> = kept.iter().map(|contact| contact.off(&found).abs()).collect();
         limit = (OUTLIER * 1.4826 * median(&mut off).unwrap_or(0.0)).clamp(0.05, NEAR);
@@ -115,12 +114,12 @@ pub fn bare_table(presses: &[(Place, Touch)], probe: &Probe) -> Result<BareTable
     let measured = |number: usize| Measured { value: found[number], error: covariance[(number, number)].sqrt() };
     let rise = steepest([found[3], found[4]], &covariance);
     if rise.value - 2.0 * rise.error > BEARABLE {
-        return Err(LocateProblem::Slanted {
-            rise: rise.value,
-            reach: REACH,
-            toward: found[4].atan2(found[3]).to_degrees(),
-        }
-        .into());
+        let toward = found[4].atan2(found[3]).to_degrees();
+        return Err(problem!(
+            "the table rises by {:.1} mm in {REACH:.0} mm, toward {toward:.0}° from the x axis",
+            rise.value
+        )
+        .fix("Level the table, or turn the frame of positions so that z is 0 all over it."));
     }
     Ok(BareTable {
         presses: presses.len(),
@@ -145,9 +144,9 @@ fn steepest(slopes: [f64; 2], covariance: &Square) -> Measured {
 fn contacts(presses: &[(Place, Touch)], probe: &Probe) -> Result<Vec<Contact>> {
     let (mut all, any) = (Vec::new(), Hand { spacing: 0, speed: 0, stroke: None });
     for (press, (place, touch)) in presses.iter().enumerate() {
-        let met = heights(touch, probe).ok_or_else(|| Error::variant_at(place.clone(), LocateProblem::Nowhere))?;
+        let met = heights(touch, probe).ok_or_else(|| nowhere().at(place.clone()))?;
         if any.seen(touch).is_none() {
-            return Err(Error::variant_at(place.clone(), LocateProblem::NotDown));
+            return Err(not_down().at(place.clone()));
         }
         all.extend(met.into_iter().enumerate().filter_map(|(finger, met)| Some((press, finger, met?))));
     }
@@ -161,18 +160,37 @@ fn contacts(presses: &[(Place, Touch)], probe: &Probe) -> Result<Vec<Contact>> {
     Ok(all.into_iter().map(contact).collect())
 }
 
+/// The problem of a finger, counted from 1, that met the bare table too rarely.
+fn few_presses(finger: usize, presses: usize) -> Error {
+    problem!("finger {finger} met the table in only {presses} presses, of at least {LEAST_PRESSES}")
+        .fix("Record 20 presses, and look for a finger that often stays open.")
+}
+
+/// The problem of presses that do not show the slope of the table.
+fn one_place() -> Error {
+    problem!("from these presses the slope of the table cannot be told from offsets of the fingertips")
+        .fix("Press all over the table, and turn the hand by half a turn after each press.")
+}
+
 /// Refuses presses that met something else, and too few of them.
 fn check(presses: &[(Place, Touch)], all: &[Contact], kept: &[&Contact], found: &Numbers) -> Result<()> {
     let aside = all.len() - kept.len();
     if aside as f64 > MOST_ASIDE * all.len() as f64 {
         let farthest = all.iter().max_by(|a, b| a.off(found).abs().total_cmp(&b.off(found).abs()));
         let (place, off) = farthest.map_or_else(Default::default, |own| (presses[own.press].0.clone(), own.off(found)));
-        return Err(Error::variant_at(place, LocateProblem::NotBare { off, aside, contacts: all.len() }));
+        return Err(problem!(
+            "a contact is {:.1} mm {} the table, and {aside} of {} contacts are not with it",
+            off.abs(),
+            if off > 0.0 { "above" } else { "below" },
+            all.len()
+        )
+        .fix("Press beside the object, on one level table.")
+        .at(place));
     }
     for finger in 0..FINGERS {
         let presses = kept.iter().filter(|contact| contact.finger == finger).count();
         if presses < LEAST_PRESSES {
-            return Err(LocateProblem::FewPresses { finger: finger + 1, presses, least: LEAST_PRESSES }.into());
+            return Err(few_presses(finger + 1, presses));
         }
     }
     Ok(())

@@ -1,10 +1,9 @@
 //! Objects on a simulated table, pressed by a hand that knows where it is.
 
 use super::Lying;
-use super::error::LocateProblem;
 use super::lying::grouped;
 use crate::capture;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, problem};
 use crate::in_order::in_order;
 use crate::mesh::Object;
 use crate::mesh::placements::{self, Placement};
@@ -129,12 +128,16 @@ impl Real {
     /// Noise of a hand of this speed, in millimeters per second.
     ///
     /// # Errors
-    /// [`LocateProblem::Noise`] for noise that a simulated table does not have.
+    /// For noise that a simulated table does not have.
     pub fn of(noise: &Noise, speed: f64) -> Result<Self> {
         let real = Self::like(noise, speed);
         let Noise { deviation, timer, position, drift, .. } = *noise;
         let known = with!(real.noise(speed), deviation, timer, position, drift);
-        if known == *noise { Ok(real) } else { Err(LocateProblem::Noise.into()) }
+        if known != *noise {
+            return Err(problem!("a simulated table has other noise")
+                .fix("Use noise, timer, missed (one share for all fingers), position and drift."));
+        }
+        Ok(real)
     }
 
     /// The part of the noise that a simulated table has. A range of noise becomes its root mean square.

@@ -1,11 +1,12 @@
 //! Surfaces as the bytes that the chip reads.
 
 use super::Settings;
-use super::error::LocateProblem;
+use super::shape::{in_placement, not_met};
 use super::surface::Surface;
 use crate::compile::{self, OwnedSection, file, restated_file};
-use crate::error::Result;
+use crate::error::{Error, Result, problem};
 use crate::probe::approach::Probe;
+use palpate_onboard::ModelError;
 use palpate_onboard::locate::{BEYOND, DISTANCES, MAPS_LENGTH, Maps, PLACEMENT_LENGTH, WIDTHS, WITHIN};
 use palpate_shared::format::{HeaderBuilder, Length, MAPS_LAYOUT, Promise, Tag, TrainedProbe};
 
@@ -21,27 +22,32 @@ const WINDOWS: [i32; 4] = [4, 8, 16, 32];
 /// Writes a model of maps.
 ///
 /// # Errors
-/// [`LocateProblem`] for an object without a surface, or a name or a map that is too large; [`Kind::Setting`](crate::error::Kind::Setting) for settings out of range.
+/// For an object without a surface, and for a name or a map that is too large; [`Kind::Setting`](crate::error::Kind::Setting) for
+/// settings out of range.
 pub fn write(surfaces: &[Surface], objects: &[String], probe: &Probe, settings: &Settings) -> Result<Vec<u8>> {
     settings.check()?;
     if objects.is_empty() {
-        return Err(LocateProblem::NoObjects.into());
+        return Err(
+            problem!("there are no objects to make maps of").fix("Give at least one mesh, or touches of one object.")
+        );
     }
     for (index, object) in objects.iter().enumerate() {
         if !surfaces.iter().any(|surface| surface.object == index) {
-            return Err(LocateProblem::NotMet { object: object.clone(), placement: String::new() }.into());
+            return Err(not_met(object, ""));
         }
     }
-    let count = u8::try_from(surfaces.len()).map_err(|_| LocateProblem::Placements { found: surfaces.len() })?;
+    let count = u8::try_from(surfaces.len()).map_err(|_| {
+        problem!("there are {} placements, and a model has at most 255", surfaces.len())
+            .fix("Leave objects out, or placements that are rare.")
+    })?;
     let (mut records, mut heights) = (Vec::new(), Vec::new());
     for surface in surfaces {
         let offset = u32::try_from(heights.len()).unwrap_or(u32::MAX);
         let scale = (surface.top() * SIXTEENTHS * 64.0 / 255.0).ceil().max(1.0);
         let radius = ((surface.radius() + 2.0) * SIXTEENTHS).ceil();
-        let large =
-            |_| LocateProblem::Large { object: objects[surface.object].clone(), placement: surface.placement.clone() };
+        let large = || too_large(&objects[surface.object], &surface.placement);
         let [scale, radius] =
-            [scale, radius].map(|number| if number < 65_535.0 { Ok(number as u16) } else { Err(large(())) });
+            [scale, radius].map(|number| if number < 65_535.0 { Ok(number as u16) } else { Err(large()) });
         let (scale, radius) = (scale?, radius?);
         records.push(u8::try_from(surface.object).unwrap_or(u8::MAX));
         records.push(u8::from(surface.is_round));
@@ -51,7 +57,7 @@ pub fn write(surfaces: &[Surface], objects: &[String], probe: &Probe, settings: 
         records.extend(offset.to_le_bytes());
         for half in levels(surface, &mut heights, scale) {
             for half in half {
-                records.push(u8::try_from(half).map_err(|_| large(()))?);
+                records.push(u8::try_from(half).map_err(|_| large())?);
             }
         }
         records.extend([0; 2]);
@@ -72,7 +78,10 @@ pub fn write(surfaces: &[Surface], objects: &[String], probe: &Probe, settings: 
     let mut text = Vec::new();
     let placements = surfaces.iter().map(|surface| surface.placement.as_str());
     for name in std::iter::once(env!("CARGO_PKG_VERSION")).chain(objects.iter().map(String::as_str)).chain(placements) {
-        text.push(u8::try_from(name.len()).map_err(|_| LocateProblem::NameTooLong { name: name.into() })?);
+        text.push(
+            u8::try_from(name.len())
+                .map_err(|_| problem!("the name {name:?} is longer than 255 bytes").fix("Give it a shorter name."))?,
+        );
         text.extend(name.bytes());
     }
     text.resize(text.len().next_multiple_of(4), 0);
@@ -96,7 +105,7 @@ pub fn write(surfaces: &[Surface], objects: &[String], probe: &Probe, settings: 
         .with_odds(crate::calibrate::odds_of(settings.margin()))
         .with_max_touches(settings.max_touches);
     let bytes = file(header, text, sections, Vec::new())?;
-    Maps::new(&bytes).map_err(|error| LocateProblem::Refused { error })?;
+    Maps::new(&bytes).map_err(refused)?;
     Ok(bytes)
 }
 
@@ -112,10 +121,33 @@ pub(super) struct Restated {
     pub(super) promise: Option<Promise>,
 }
 
+/// The problem of bytes that are no model of maps.
+pub fn refused(error: ModelError) -> Error {
+    problem!("{error}").fix("Train it again; models of trees are for `recognize` without positions.")
+}
+
+/// The problem of maps that state no hand in millimeters.
+pub fn no_hand() -> Error {
+    problem!("the maps do not state the hand that they were learned with")
+        .fix("Train it on a data set whose probe is in millimeters.")
+}
+
+/// The problem of a model of trees where one of maps is needed.
+pub fn not_maps() -> Error {
+    problem!("a model of trees, not of maps")
+        .fix("Make maps (`palpate maps train`), or give what recognizes without positions.")
+}
+
+/// The problem of a placement that is too large for a map.
+pub(super) fn too_large(object: &str, placement: &str) -> Error {
+    problem!("{object}: it is too large for a map{}", in_placement(placement))
+        .fix("Use maps of 2 mm, or leave it out: a map reaches 250 cells from its middle.")
+}
+
 /// The model with other statements.
 ///
 /// # Errors
-/// [`LocateProblem::Refused`] if it could not be read then.
+/// When the model could not be read then.
 pub(super) fn restated(maps: Maps<'_>, stated: &Restated) -> Result<Vec<u8>> {
     let &Restated { odds, max_touches, ref least_fits, stretch, promise } = stated;
     let mut content = maps.section(Tag::Maps).unwrap_or_default().to_vec();
@@ -132,7 +164,7 @@ pub(super) fn restated(maps: Maps<'_>, stated: &Restated) -> Result<Vec<u8>> {
         ..compile::Restated::default()
     };
     let bytes = restated_file(maps.model(), &restated)?;
-    Maps::new(&bytes).map_err(|error| LocateProblem::Refused { error })?;
+    Maps::new(&bytes).map_err(refused)?;
     Ok(bytes)
 }
 

@@ -4,7 +4,7 @@ use super::Global;
 use super::expected::ExpectedArguments;
 use super::recognize_lines::{Event, Line, each_of};
 use super::recognize_rows::verdict_name;
-use palpate::error::LocateProblem;
+use palpate::error::Kind;
 use palpate::locate::{self, Approach, Hand, Locating, Maps, MapsFile, POSE, Pose};
 use palpate::output;
 use palpate::{Error, Result, compile};
@@ -125,7 +125,7 @@ pub(super) fn run(file: &MapsFile, touches: &Path, asked: &Asked<'_>, global: &G
     };
     let names = locate::names(&maps);
     let weights = asked.expected.weights(&names, &vec![1.0; names.len()])?;
-    let hand = Hand::of(&maps).ok_or(LocateProblem::NoHand).map_err(Error::from)?;
+    let hand = Hand::of(&maps).ok_or_else(locate::no_hand)?;
     let within = locate::workspace(&maps, asked.workspace)?;
     let mut stream = Stream::new(maps, hand, stopping, weights, asked.next.then_some(within), global);
     stream.begin();
@@ -179,8 +179,8 @@ impl<'m> Stream<'m> {
                 self.locating.push(seen);
                 None
             }
-            Err(aslant @ LocateProblem::NotDown) => Some(aslant.to_string()),
-            Err(problem) => return Err(Error::variant_at(place, problem)),
+            Err(aslant) if aslant.is(&Kind::NotDown) => Some(aslant.what().to_owned()),
+            Err(error) => return Err(error.at(place)),
         };
         self.print(refused)?;
         if self.locating.verdict() != Verdict::Undecided {

@@ -29,7 +29,7 @@ pub(super) fn read(path: &Path, file: &ProbeFile) -> Result<Touched> {
     let (mut touches, mut samples) = (Vec::new(), Vec::new());
     each_of(path, &mut |event| {
         if let Event::Touch { touch, place } = event {
-            samples.extend(locate::samples(touch, &file.probe).map_err(|problem| Error::variant_at(place, problem))?);
+            samples.extend(locate::samples(touch, &file.probe).map_err(|error| error.at(place))?);
             touches.push(*touch);
         }
         Ok(())
@@ -117,7 +117,7 @@ pub(super) fn explore(goal: Known, model: &Path, touches: &Path, workspace: Opti
             (shape, touch) = (begin(), 0);
             return Ok(());
         };
-        shape.push(met).map_err(|problem| Error::variant_at(place, problem))?;
+        shape.push(met).map_err(|error| error.at(place))?;
         touch += 1;
         let relief = shape.relief();
         let known = relief.known(goal.millimeters);

@@ -8,7 +8,6 @@ use super::real::RealArguments;
 use super::shape::{self, Touched};
 use palpate::calibrate;
 use palpate::ensemble::StatedProbe;
-use palpate::error::LocateProblem;
 use palpate::evaluate::Finding;
 use palpate::locate::{
     self, Aimed, Calibrated, Evaluation, Inspected, LeftOut, MapsFile, POSE, Promised, Real, Standing, Terms, ToPlace,
@@ -93,7 +92,7 @@ impl TableArguments {
         let Some(file) = MapsFile::read(wanted.model)? else {
             // If the file holds no trees either, its own error says why.
             palpate::compile::CompiledModel::read(wanted.model)?;
-            return Err(Error::variant_at(palpate::error::Place::file(wanted.model), LocateProblem::Trees));
+            return Err(locate::not_maps().in_file(wanted.model));
         };
         let maps = file.maps();
         let probe = locate::hand(&maps).map_err(|error| error.in_file(wanted.model))?;
