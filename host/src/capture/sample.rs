@@ -105,7 +105,7 @@ impl<'a> Sampler<'a> {
             }
             let (distances, is_turned_back) = probe.within_travel(distances);
             let touch = approach.touch(distances, probe);
-            let touch = added.as_mut().map_or(touch, |random| self.origin.real.add_to(&touch, probe, random));
+            let touch = added.as_mut().map_or(touch, |random| self.origin.real.add_to(&touch, random));
             // The stroke begins with the first contact that is noticed.
             let is_late = hand::late(&touch, window);
             late.iter_mut().zip(is_late).for_each(|(late, is_late)| *late += u64::from(is_late));

@@ -33,7 +33,7 @@ pub(super) fn radians(turn: usize) -> f64 {
 pub struct Lying {
     /// Name of the placement.
     pub name: String,
-    /// How often the object lies like this, relative to its other poses.
+    /// Frequency of this pose, relative to the object's others.
     pub share: f64,
     /// The rotation from the object's frame to that of the table, whose z axis points up.
     pub rotation: DMat3,
@@ -94,7 +94,7 @@ impl Onto {
         turned([x - self.shift[0], y - self.shift[1]], -self.turn)
     }
 
-    /// Where the other one would lie, and how it would be turned, to look like the pose at a place.
+    /// Place and turn of the other one at which it looks like the pose at a place.
     pub(super) fn placed(&self, place: [f64; 2], yaw: f64) -> ([f64; 2], f64) {
         let yaw = yaw - self.turn;
         let [x, y] = turned(self.shift, yaw);

@@ -64,9 +64,6 @@ pub struct ObjectTouches {
     /// The stroke of the probe that made them as a time in microseconds: also with noise that is added, a later contact is
     /// missing.
     window: Option<u32>,
-    /// The nominal speed in millimeters per second of the probe that made touches with a position: where noise loses the first
-    /// contact, the hand goes on.
-    speed: Option<f64>,
 }
 
 /// Touches of an object that may be mixed in a sequence: those of one source that one robot made.
@@ -82,15 +79,7 @@ impl ObjectTouches {
     /// Touches that are all of one source.
     pub fn new(name: impl Into<String>, touches: Vec<Touch>, source: Source) -> Self {
         let sources = if touches.is_empty() { Vec::new() } else { vec![source] };
-        Self {
-            name: name.into(),
-            touches,
-            sources,
-            source_of: Vec::new(),
-            robot_of: Vec::new(),
-            window: None,
-            speed: None,
-        }
+        Self { name: name.into(), touches, sources, source_of: Vec::new(), robot_of: Vec::new(), window: None }
     }
 
     /// Touches of instances or placements in turn: touch i is of number `first` + i modulo their number. Without any, and of one
@@ -110,8 +99,7 @@ impl ObjectTouches {
         }
         // Below the number of the instances.
         let source_of = (0..touches.len() as u64).map(|touch| ((first % count + touch) % count) as u32).collect();
-        Self { name: name.into(), touches, sources, source_of, robot_of: Vec::new(), window: None, speed: None }
-            .tidied()
+        Self { name: name.into(), touches, sources, source_of, robot_of: Vec::new(), window: None }.tidied()
     }
 
     /// Touches in any order, each with the number of its instance.
@@ -127,7 +115,7 @@ impl ObjectTouches {
         let place = |(_, number): &(Touch, i64)| numbers.partition_point(|other| other < number) as u32;
         let source_of = touches.iter().map(place).collect();
         let sources = numbers.iter().map(|number| Source::Instance(number.to_string())).collect();
-        Self { name: name.into(), touches: all, sources, source_of, robot_of: Vec::new(), window: None, speed: None }
+        Self { name: name.into(), touches: all, sources, source_of, robot_of: Vec::new(), window: None }
     }
 
     /// Touches of one source after the other: of each as many as are stated, of the last one all the rest.
@@ -145,8 +133,7 @@ impl ObjectTouches {
             sources.push(Source::Object);
             source_of = vec![0; touches.len()];
         }
-        Self { name: name.into(), touches, sources, source_of, robot_of: Vec::new(), window: None, speed: None }
-            .tidied()
+        Self { name: name.into(), touches, sources, source_of, robot_of: Vec::new(), window: None }.tidied()
     }
 
     /// The touches of several objects, one after the other, as those of one whose sources are all of theirs.
@@ -179,7 +166,7 @@ impl ObjectTouches {
 
     fn extend(&mut self, more: &Self, may_share: bool) {
         if self.is_empty() {
-            (self.window, self.speed) = (more.window, more.speed);
+            self.window = more.window;
         }
         let (before, robots) = (self.touches.len(), self.robot_of.len() + more.robot_of.len());
         if self.source_of.is_empty() {
@@ -234,13 +221,12 @@ impl ObjectTouches {
     /// These touches as made by the probe of this origin.
     #[must_use]
     pub(crate) fn of_origin(self, origin: &Origin) -> Self {
-        let speed = origin.position.then_some(origin.probe.speed);
-        Self { speed, ..self.of_stroke(origin.probe.window()) }
+        self.of_stroke(origin.probe.window())
     }
 
     /// The noise of these touches, in any order.
     pub(crate) fn stream(&self, noise: &Noise, seed: u64) -> Stream {
-        noise.stream(&self.name, self.len(), seed).at_speed(self.speed)
+        noise.stream(&self.name, self.len(), seed)
     }
 
     /// Touches made of these, such as by noise, without contacts later than the stroke.
@@ -435,7 +421,6 @@ impl ObjectTouches {
             source_of: of(&self.source_of),
             robot_of: of(&self.robot_of),
             window: self.window,
-            speed: self.speed,
         };
         some.tidied()
     }

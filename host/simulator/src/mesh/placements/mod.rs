@@ -110,8 +110,8 @@ pub fn placements(mesh: &Mesh) -> Result<Placements> {
     found(mesh).map(|(placements, _)| placements)
 }
 
-/// Every pose in which a mesh rests on its hull, by descending weight, none of them merged with another or left out. The ones of
-/// [`placements`] come first and have the names there, but their own weights; they go on with the next numbers. Cost: as for
+/// Every pose in which a mesh rests on its hull, with its own weight: none is merged with another or left out. The ones of
+/// [`placements`] come first and have the same names; the others follow by descending weight, with the next numbers. Cost: as for
 /// [`placements`].
 ///
 /// # Errors

@@ -24,11 +24,11 @@ pub use grazing::Grazing;
 pub use partial::{PartialNoise, keys};
 
 use crate::error::{Error, Result};
-use crate::probe::approach::{FINGERS, Probe, to_q15};
+use crate::probe::approach::{FINGERS, to_q15};
 use crate::random::{self, Purpose};
 use glam::DVec3;
 use palpate_shared::format::{PromisedNoise, TrainedNoise};
-use palpate_shared::{ContactTime, Pose, Position, Q15_ONE, Touch};
+use palpate_shared::{ContactTime, Pose, Q15_ONE, Touch};
 use quantity::DURATION;
 use rand::RngExt;
 use rand::rngs::ChaCha8Rng;
@@ -248,16 +248,15 @@ impl Noise {
         let mut gaussian = random::generator(seed, Purpose::Noise, name, 0);
         let mut normal = || std::array::from_fn(|_| StandardNormal.sample(&mut gaussian));
         let normals = (0..count).map(|_| normal()).collect();
-        Stream { noise: *self, name: name.into(), seed, speed: None, normals }
+        Stream { noise: *self, name: name.into(), seed, normals }
     }
 
-    /// A touch of this probe with this noise, whose random numbers come from `random`; made by a robot of its own. For touches
+    /// A touch with this noise, whose random numbers come from `random`; made by a robot of its own. For touches
     /// that are made one at a time, such as those of a capture.
-    pub fn add_to(&self, touch: &Touch, probe: &Probe, random: &mut ChaCha8Rng) -> Touch {
+    pub fn add_to(&self, touch: &Touch, random: &mut ChaCha8Rng) -> Touch {
         let normal = std::array::from_fn(|_| StandardNormal.sample(random));
         let [own, robot] = [Draw::new(random), Draw::new(random)];
-        let noisy = self.one(touch, normal, &own, &robot, Some(probe.speed));
-        self.displaced(noisy, random)
+        self.one(touch, normal, &own, &robot)
     }
 
     /// This noise and `more` added after it, as far as one noise can say it: variances and shares of missed contacts add
@@ -288,28 +287,17 @@ impl Noise {
         }
     }
 
-    fn one(
-        &self,
-        touch: &Touch,
-        normal: [f64; FINGERS],
-        own: &Draw,
-        robot: &Draw,
-        nominal_speed: Option<f64>,
-    ) -> Touch {
+    fn one(&self, touch: &Touch, normal: [f64; FINGERS], own: &Draw, robot: &Draw) -> Touch {
         let Deviation { least, largest } = self.deviation;
         let deviation = least + (largest - least) * own.level * own.level.sqrt();
         let speed = self.speed * (1.0 + self.speed_error * own.speed) * (1.0 + self.speed_bias * robot.speed);
         let missing = std::array::from_fn(|finger| own.missed[finger] < self.missed[finger]);
         let left = missed(touch, missing);
-        // Time of the first contact that is noticed.
-        let lost = touch.times().into_iter().zip(left.times()).find(|(_, kept)| *kept == ContactTime::FIRST);
-        let lost = lost.and_then(|(time, _)| time.micros()).unwrap_or_default();
-        let (noisy, first) = timed(&left, |finger, time| {
+        let noisy = timed(&left, |finger, time| {
             let sensed =
                 time / speed - self.bent[finger] + deviation * normal[finger] + self.debounce * own.debounce[finger];
             if self.timer > 0.0 { ((sensed / self.timer + own.phase).floor()) * self.timer } else { sensed }
         });
-        let noisy = moved(touch, noisy, f64::from(lost) / speed + first, nominal_speed.map(|nominal| nominal * speed));
         match noisy.pose() {
             Some(pose) if self.pose > 0.0 || self.pose_bias > 0.0 => {
                 let angle = |degrees: f64| degrees.to_radians();
@@ -322,16 +310,6 @@ impl Noise {
             _ => noisy,
         }
     }
-
-    /// The touch with the error of its position, if it has one; only then are random numbers drawn.
-    fn displaced(&self, touch: Touch, random: &mut ChaCha8Rng) -> Touch {
-        let Some(Position { micrometers }) = touch.position() else { return touch };
-        let off = |coordinate: i32| {
-            let normal: f64 = StandardNormal.sample(random);
-            whole(f64::from(coordinate) + self.position * normal)
-        };
-        touch.with_position(Position { micrometers: micrometers.map(off) })
-    }
 }
 
 /// The noise of an object's touches: a pure function of noise, seed, the object's name and the position of each touch.
@@ -340,34 +318,24 @@ pub struct Stream {
     noise: Noise,
     name: String,
     seed: u64,
-    /// The probe's nominal speed in millimeters per second, if known.
-    speed: Option<f64>,
     /// For each touch its Gaussian numbers. They have a stream of their own, three for each touch, so that no other setting
     /// changes the noise of one level.
     normals: Vec<[f64; FINGERS]>,
 }
 
 impl Stream {
-    /// This noise, for touches with a position that a probe with this nominal speed made, in millimeters per second: where the
-    /// first contact that is noticed comes earlier or later, the hand is higher or lower. Without it positions stay.
-    #[must_use]
-    pub fn at_speed(self, speed: Option<f64>) -> Self {
-        Self { speed, ..self }
-    }
-
     /// Adds it to the touch at this position, below the count that it was made for, made by this robot. A robot's bias
     /// is the same for every object.
     pub fn add(&self, touch: &Touch, position: usize, robot: u64) -> Touch {
         let (noise, normal) = (&self.noise, self.normals[position]);
         if *noise == (Noise { deviation: noise.deviation.least.into(), ..Noise::default() }) {
-            let (noisy, first) = timed(touch, |finger, time| time + noise.deviation.least * normal[finger]);
-            return moved(touch, noisy, first, self.speed);
+            return timed(touch, |finger, time| time + noise.deviation.least * normal[finger]);
         }
         let mut sensor = random::generator(self.seed, Purpose::Sensor, &self.name, position as u64);
         let own = Draw::new(&mut sensor);
         let bias = || Draw::new(&mut random::generator(self.seed, Purpose::Robot, "", robot));
         let robot = noise.has_bias().then(bias).unwrap_or_default();
-        noise.displaced(noise.one(touch, normal, &own, &robot, self.speed), &mut sensor)
+        noise.one(touch, normal, &own, &robot)
     }
 }
 
@@ -448,30 +416,6 @@ fn is_still(drift: &[f64; 2]) -> bool {
     *drift == [0.0; 2]
 }
 
-/// The nearest whole number; a conversion saturates.
-fn whole(number: f64) -> i32 {
-    number.round() as i32
-}
-
-/// A noisy touch with the position that the hand has at the first contact that is noticed: `after` microseconds of its motion
-/// after the position of the touch without noise, at this speed in millimeters per second. If no contact is noticed, the hand
-/// goes on to the table. Without a known speed the position stays.
-fn moved(clean: &Touch, noisy: Touch, after: f64, speed: Option<f64>) -> Touch {
-    let (Some(Position { micrometers }), Some(Pose { direction, .. })) = (clean.position(), clean.pose()) else {
-        return noisy;
-    };
-    let [x, y, z] = direction.map(|cosine| f64::from(cosine) / f64::from(Q15_ONE));
-    let way = match (clean.is_empty(), noisy.is_empty()) {
-        (true, _) => 0.0,
-        (false, true) if z < 0.0 => (f64::from(micrometers[2]) / -z).max(0.0),
-        (false, true) => 0.0,
-        // Millimeters per second are thousandths of a micrometer per microsecond.
-        _ => speed.map_or(0.0, |speed| after * speed / 1e3),
-    };
-    let [px, py, pz] = micrometers.map(f64::from);
-    noisy.with_position(Position { micrometers: [px + x * way, py + y * way, pz + z * way].map(whole) })
-}
-
 /// The touch without the contacts of these fingers.
 fn missed(touch: &Touch, missed: [bool; FINGERS]) -> Touch {
     let mut times = touch.times();
@@ -479,8 +423,8 @@ fn missed(touch: &Touch, missed: [bool; FINGERS]) -> Touch {
     touch.with_times(times)
 }
 
-/// The touch with other contact times, in microseconds: the earliest becomes 0. The second value is the earliest one.
-fn timed(touch: &Touch, change: impl Fn(usize, f64) -> f64) -> (Touch, f64) {
+/// The touch with other contact times, in microseconds: the earliest becomes 0.
+fn timed(touch: &Touch, change: impl Fn(usize, f64) -> f64) -> Touch {
     let times = touch.times();
     let changed: [Option<f64>; FINGERS] =
         std::array::from_fn(|finger| times[finger].micros().map(|micros| change(finger, f64::from(micros))));
@@ -490,5 +434,5 @@ fn timed(touch: &Touch, change: impl Fn(usize, f64) -> f64) -> (Touch, f64) {
         Some(time) => ContactTime::from_micros((time - earliest).round().min(f64::from(u32::MAX - 1)) as u32),
         None => ContactTime::MISSING,
     });
-    (touch.with_times(shifted), earliest)
+    touch.with_times(shifted)
 }
