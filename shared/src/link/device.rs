@@ -249,7 +249,7 @@ impl DeviceEnd {
                         transmit(asker, Message::Answer { number, answer: Answer::Forgotten }, &mut send);
                     }
                 }
-                Message::Heard { number } if is_own && number == events.oldest => {
+                Message::Heard { number } if is_own && number == events.oldest && number != events.next => {
                     events.drop_oldest();
                     send_event(*session, events.message(events.oldest), &mut send);
                 }

@@ -76,6 +76,12 @@ impl fmt::Display for LinkError {
 
 impl core::error::Error for LinkError {}
 
+/// Step from the number of a session that was not opened to the next one; odd, so that none returns soon.
+const SESSION_STEP: u32 = 0x9e37_79b9;
+
+/// Starts of chips whose events a host remembers to have heard.
+const BOOTS: usize = 16;
+
 /// The request under way.
 #[derive(Clone, Copy, Debug)]
 struct Sent {
@@ -104,8 +110,9 @@ pub struct HostEnd {
     /// Number of the last request.
     number: u32,
     sent: Option<Sent>,
-    /// The chip's boot number when the session was opened, and the number of the event that is to come next.
-    heard: Option<(u32, u32)>,
+    /// The chip's boot number and the number of the event that is to come next, and those of its starts before, or of other chips:
+    /// that of the session first.
+    heard: [Option<(u32, u32)>; BOOTS],
     /// True once the chip has said that it does not know the session.
     is_forgotten: bool,
     statistics: HostStatistics,
@@ -121,7 +128,7 @@ impl HostEnd {
             is_open: false,
             number: 0,
             sent: None,
-            heard: None,
+            heard: [None; BOOTS],
             is_forgotten: false,
             statistics: HostStatistics { sent: 0, resent: 0, received: 0, garbled: 0, repeated: 0, missed_events: 0 },
         }
@@ -135,8 +142,8 @@ impl HostEnd {
     /// Starts opening a session; [`Incoming::Opened`] says when it is. A request under way is dropped. Events are counted on from the
     /// session before: those that the chip still keeps come, and those that it gave up are missed.
     ///
-    /// `session` is the session's number: a random one, another each time, so that no two hosts take the same. 0 counts
-    /// as 1.
+    /// `session` is where the numbers of sessions begin: a random one, another each time, so that no two hosts take the same. 0 counts
+    /// as 1. Each time that the chip is asked, another number follows.
     pub fn connect(&mut self, session: u32, now: u64, send: impl FnMut(&[u8])) {
         // 0 is the session of a chip that knows of none.
         (self.session, self.is_open, self.is_forgotten) = (session.max(1), false, false);
@@ -207,26 +214,22 @@ impl HostEnd {
                 match answer {
                     Answer::Session { session, boot, event } if !self.is_open && session == self.session => {
                         self.is_open = true;
-                        self.heard = match self.heard {
-                            // What it told before it was listened to is nobody's.
-                            None => Some((boot, event)),
-                            // A chip that has started counts from 0.
-                            Some((known, _)) if known != boot => Some((boot, 0)),
-                            known => known,
-                        };
+                        self.remember(boot, event);
                         incoming(Incoming::Opened);
                     }
                     Answer::Session { session: previous, boot, .. } if !self.is_open => {
+                        // Another chip that was asked before may have opened this one.
+                        self.session = self.session.wrapping_add(SESSION_STEP).max(1);
                         self.put(Request::Hello { previous, boot }, now, send);
                     }
-                    Answer::Forgotten => self.is_forgotten = true,
+                    Answer::Forgotten => (self.is_open, self.is_forgotten) = (false, true),
                     answer => incoming(Incoming::Answer(answer)),
                 }
             }
             Message::Event { number, event } if self.is_open && session == self.session => {
                 let heard = Message::Heard { number };
                 send(encode(&Frame { session, message: heard }, &mut [0; FRAME_MAX]));
-                let Some((_, next)) = &mut self.heard else { return };
+                let [Some((_, next)), ..] = &mut self.heard else { return };
                 let missed = number.wrapping_sub(*next);
                 if missed >> 31 == 1 {
                     self.statistics.repeated += 1;
@@ -238,6 +241,18 @@ impl HostEnd {
             }
             Message::Event { .. } if self.is_open => incoming(Incoming::Stranger),
             _ => self.statistics.repeated += 1,
+        }
+    }
+
+    /// Puts a start of a chip first, whose next event has this number.
+    fn remember(&mut self, boot: u32, event: u32) {
+        let known = self.heard.iter().position(|heard| heard.is_some_and(|(known, _)| known == boot));
+        // What the first one told before it was listened to is nobody's; those after it are counted from 0.
+        let next = if self.heard.iter().all(Option::is_none) { event } else { 0 };
+        let last = self.heard.get_mut(..=known.unwrap_or(BOOTS - 1)).unwrap_or_default();
+        last.rotate_right(1);
+        if let (None, [first, ..]) = (known, last) {
+            *first = Some((boot, next));
         }
     }
 

@@ -59,9 +59,8 @@ fn pass(mut from: TcpStream, mut to: TcpStream, seed: u64) {
             }
             passed.extend_from_slice(&whole);
             late.iter_mut().for_each(|(others, _)| *others -= 1);
-            while let Some((0, whole)) = late.front() {
-                passed.extend_from_slice(whole);
-                late.pop_front();
+            while let Some((_, whole)) = late.pop_front_if(|(others, _)| *others <= 0) {
+                passed.extend(whole);
             }
         }
         if to.write_all(&passed).is_err() {

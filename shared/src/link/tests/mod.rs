@@ -335,7 +335,7 @@ fn a_model_arrives_whole_over_a_bad_line_and_a_wrong_one_leaves_the_old() {
 }
 
 #[test]
-fn a_model_of_27_kilobytes_loads_in_three_and_a_quarter_seconds_at_115_200_baud() {
+fn a_model_of_27_kilobytes_loads_in_less_than_3_42_seconds_at_115_200_baud() {
     let (mut host, mut chip, mut notebook) =
         (HostEnd::new(HostSettings::default()), DeviceEnd::new(1), Notebook::default());
     let model = vec![0x5a; 27_251];
@@ -373,7 +373,8 @@ fn a_model_of_27_kilobytes_loads_in_three_and_a_quarter_seconds_at_115_200_baud(
         host.request(request, micros, |frame| sent.extend_from_slice(frame));
     }
     assert!(next > 27_000 && notebook.model == model);
-    // The window of eight chunks of 128 bytes, which this replaces, took 2.63 s.
+    // At most 1.3 times as long as with a window of eight chunks of 128 bytes.
+    std::println!("{micros} microseconds");
     assert!((3_100_000..1_300 * 2_630).contains(&micros), "{micros}");
 }
 
@@ -441,6 +442,20 @@ fn an_event_is_repeated_until_it_is_heard_less_and_less_often_and_not_where_nobo
     rig.chip.tell(fault(1), |_| ());
     assert_eq!(told(&mut rig.chip, 5), [250, 750, 1_750, 2_750, 3_750, 4_750]);
     assert_eq!(rig.chip.wait(5_000_000), Some(750_000));
+}
+
+#[test]
+fn a_host_that_has_heard_what_was_never_told_changes_nothing() {
+    let mut chip = DeviceEnd::new(1);
+    let mut sent = 0;
+    for number in 0..3 {
+        chip.receive(&framed(0, Message::Heard { number }), &mut Notebook::default(), |_| sent += 1);
+    }
+    chip.tell(fault(1), |frame| {
+        let expected = framed(0, Message::Event { number: 0, event: fault(1) });
+        assert_eq!(frame, expected);
+    });
+    assert_eq!(sent, 0);
 }
 
 #[test]
