@@ -159,7 +159,7 @@ impl<'p> View<'p> {
             let from_other = other.surface.off(|at| self.pose.height(onto.of(at), radius));
             from_other.max(self.surface.off(|at| other.pose.height(onto.back(at), radius)))
         };
-        turns.into_iter().take(TRIED).find_map(|turn| {
+        let tried = turns.into_iter().take(TRIED).map(|turn| {
             let mut best = (exact(radians(turn)), radians(turn));
             let mut step = radians(1) / 2.0;
             while step > radians(1) / 20.0 && (EQUAL..limit + HOPELESS).contains(&best.0) {
@@ -167,8 +167,10 @@ impl<'p> View<'p> {
                 best = about.into_iter().fold(best, |best, own| if own.0 < best.0 { own } else { best });
                 step /= 2.0;
             }
-            (best.0 < limit).then(|| onto(best.1))
-        })
+            best
+        });
+        let best = tried.min_by(|one, other| one.0.total_cmp(&other.0))?;
+        (best.0 < limit).then(|| onto(best.1))
     }
 }
 

@@ -145,8 +145,8 @@ impl Pools {
 /// this test and does not hold with it: the model states it no more. [`calibrate_with_promise`] finds both.
 ///
 /// # Errors
-/// Those of an evaluation; [`Kind::TooFew`] for too few touches; [`Kind::NotKept`]; [`Kind::Setting`]
-/// for shares that are none.
+/// Errors of an evaluation; [`Kind::TooFew`] for too few touches, and [`Kind::NotKept`] for too many alarms;
+/// [`Kind::Setting`] for shares that are none.
 pub fn calibrate(
     model: &Model<'_>,
     dataset: &Dataset,
@@ -192,9 +192,9 @@ pub(crate) fn calibrate_supplies(
     let tried = Tried { loosest, strictest };
     let threshold = tried.threshold(&all, settings).map_err(|stop| {
         let fewest = (0..sequences.len()).min_by_key(|&object| sequences[object].len());
-        let remedy = match (stop.clone(), fewest) {
-            (Stop::TooFew { found, needed, .. }, Some(object)) if found > 0 => {
-                let (times, names) = (needed as f64 / found as f64, compile::names(model));
+        let remedy = match (&stop, fewest) {
+            (Stop::TooFew { found, needed, .. }, Some(object)) if *found > 0 => {
+                let (times, names) = (*needed as f64 / *found as f64, compile::names(model));
                 format!("Capture about {:.1} times as many touches of {}.", (10.0 * times).ceil() / 10.0, names[object])
             }
             _ => MORE_TOUCHES.into(),

@@ -65,12 +65,12 @@ fn problem(error: Error, parts: &Parts<'_>, settings: &strangers::Settings) -> E
         Kind::TooFew => {
             // Three quarters of the part that is for the test are tested on.
             let needed = needed(settings.alarms, settings.confidence) as f64 / (0.75 * TESTED * parts.share_tested());
-            let (needed, what) = (needed.ceil(), what(parts.has_groups));
-            error.fix(format!(
-                "It takes about {needed} {what} in all, because only a part of them tests for strangers; there are {}. Record more, \
-                 or calibrate without the test.",
-                parts.units
-            ))
+            let (needed, found, what) = (needed.ceil() as usize, parts.units, what(parts.has_groups));
+            let in_all = format!(
+                "It takes about {needed} {what} in all, because only a part of them tests for strangers; there are {found}. "
+            );
+            let in_all = if found < needed { in_all } else { String::new() };
+            error.fix(in_all + "Record more, or calibrate without the test.")
         }
         Kind::NotKept => error
             .fix("Train the model on rows like these, so that they fit their classes, or calibrate without the test."),
