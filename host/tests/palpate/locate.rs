@@ -19,9 +19,10 @@ fn objects() -> [Object; 2] {
         let mut mesh = Mesh::globe(12);
         for vertex in &mut mesh.vertices {
             let longest = vertex.iter().fold(0.0_f32, |longest, axis| longest.max(axis.abs()));
-            let is_bar = name == "bar";
-            // The bar is a globe that is made square.
-            *vertex = [0, 1, 2].map(|axis| half[axis] * vertex[axis] / if is_bar { longest } else { 1.0 });
+            let length = vertex.iter().map(|axis| axis * axis).sum::<f32>().sqrt();
+            // The bar is a globe that is made square, and the puck one without its bumps.
+            let scale = if name == "bar" { longest } else { length };
+            *vertex = [0, 1, 2].map(|axis| half[axis] * vertex[axis] / scale);
         }
         sized(name, mesh)
     })

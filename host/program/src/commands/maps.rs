@@ -29,7 +29,7 @@ pub(crate) struct Arguments {
 
 #[derive(clap::Subcommand)]
 enum Command {
-    /// Make height maps of objects on a table, from meshes or recorded touches
+    /// Make height maps of objects, from meshes or recorded touches
     Train(Box<TrainArguments>),
 }
 
