@@ -130,6 +130,7 @@ fn trees_know_no_touch() {
     let others = [
         "max_touches",
         "trained_touches",
+        "needs_pose",
         "compos",
         "dispos",
         "expos",
