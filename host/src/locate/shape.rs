@@ -81,7 +81,7 @@ pub fn samples(touch: &Touch, probe: &Probe) -> Result<[Sample; FINGERS]> {
 
 /// Samples of all touches.
 pub(super) fn all_samples(touches: &[Touch], probe: &Probe) -> Result<Vec<Sample>> {
-    let all = touches.iter().map(|touch| samples(touch, probe)).collect::<Result<Vec<_>, _>>().map_err(Error::from)?;
+    let all = touches.iter().map(|touch| samples(touch, probe)).collect::<Result<Vec<_>, _>>()?;
     Ok(all.concat())
 }
 

@@ -61,7 +61,7 @@ impl Heights {
         if let Some(height) = heights.into_iter().find(|height| *height < -BELOW) {
             return Err(too_low(-height));
         }
-        touch_of_seconds([None; 3], Some([0.0, 0.0, -1.0]), Some(self.row)).map_err(Error::from)?;
+        touch_of_seconds([None; 3], Some([0.0, 0.0, -1.0]), Some(self.row))?;
         Ok(())
     }
 }

@@ -264,7 +264,7 @@ fn no_touch_channel(channels: &[String]) -> Error {
     let shown = channels.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join(", ");
     let they = match channels.len() {
         0 => "no channel at all".into(),
-        ..=SHOWN => shown,
+        1..=SHOWN => shown,
         count => format!("{shown} and {} more", count - SHOWN),
     };
     problem!("no channel of touches in this log: it has {they}").fix(
