@@ -209,10 +209,7 @@ pub(crate) fn capture(
         pose,
         approaches,
         scene: cone.map_or(Surroundings::Floating, |cone| Surroundings::Table { cone }),
-        samples: samples
-            .map(|(first, end)| format!("{first}..{end}").parse::<Samples>())
-            .transpose()
-            .map_err(Error::from)?,
+        samples: samples.map(|(first, end)| format!("{first}..{end}").parse::<Samples>()).transpose()?,
         ..Origin::default()
     };
     let settings = with!(Settings::default(), origin, force, threads);

@@ -44,9 +44,7 @@ pub(crate) struct Maps {
 
 impl Maps {
     fn of(bytes: Vec<u8>) -> palpate::Result<Self> {
-        let opened = OpenedMaps::try_new(bytes, |bytes| {
-            locate::Maps::new(bytes).map_err(locate::refused)
-        })?;
+        let opened = OpenedMaps::try_new(bytes, |bytes| locate::Maps::new(bytes).map_err(locate::refused))?;
         Ok(Self { opened: Arc::new(opened) })
     }
 
@@ -479,9 +477,8 @@ impl Locator {
     ) -> Result<objects::Located<'py>, Failure> {
         let Three(times) = times;
         let touch = touch_of_seconds(times, Some([0.0, 0.0, -1.0]), Some(alignment.0))
-            .and_then(|touch| located(touch, position.all()))
-            .map_err(Error::from)?;
-        let seen = locate::seen(&self.hand, &touch).map_err(Error::from)?;
+            .and_then(|touch| located(touch, position.all()))?;
+        let seen = locate::seen(&self.hand, &touch)?;
         self.take(py, seen)
     }
 

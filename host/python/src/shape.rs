@@ -62,9 +62,8 @@ impl Shape {
     fn push(&mut self, times: Three, position: Three, alignment: Row) -> Result<(), Failure> {
         let Three(times) = times;
         let touch = touch_of_seconds(times, Some([0.0, 0.0, -1.0]), Some(alignment.0))
-            .and_then(|touch| located(touch, position.all()))
-            .map_err(Error::from)?;
-        self.shape.push(&touch).map_err(Error::from)?;
+            .and_then(|touch| located(touch, position.all()))?;
+        self.shape.push(&touch)?;
         self.relief = None;
         Ok(())
     }
