@@ -76,7 +76,7 @@ impl fmt::Display for LinkError {
 
 impl core::error::Error for LinkError {}
 
-/// Step from the number of a session that was not opened to the next one; odd, so that none returns soon.
+/// Step from the number of a session to the next one; odd, so that none returns soon.
 const SESSION_STEP: u32 = 0x9e37_79b9;
 
 /// Starts of chips whose events a host remembers to have heard.
@@ -148,6 +148,12 @@ impl HostEnd {
         // 0 is the session of a chip that knows of none.
         (self.session, self.is_open, self.is_forgotten) = (session.max(1), false, false);
         self.put(Request::Hello { previous: 0, boot: 0 }, now, send);
+    }
+
+    /// As [`connect`](Self::connect), where a session has ended, with the number that follows. A number that the chip may know already would
+    /// not do: it takes the hello for a request of that session, and does not answer it, or refuses it.
+    pub fn reconnect(&mut self, now: u64, send: impl FnMut(&[u8])) {
+        self.connect(self.session.wrapping_add(SESSION_STEP), now, send);
     }
 
     /// True if the session is open, and no request is under way.
@@ -259,7 +265,7 @@ impl HostEnd {
     /// Sends the request under way again if it has been without an answer for too long. Call it often.
     ///
     /// # Errors
-    /// [`LinkError`] when the session cannot go on: [`HostEnd::connect`] begins another.
+    /// [`LinkError`] when the session cannot go on: [`HostEnd::reconnect`] begins another.
     pub fn tick(&mut self, now: u64, mut send: impl FnMut(&[u8])) -> Result<(), LinkError> {
         if self.is_forgotten {
             return Err(LinkError::Forgotten);

@@ -44,17 +44,19 @@ struct Desk {
     end: DeviceEnd,
     chip: Chip,
     now: u64,
+    /// Number of the last session, another each time, as pages draw them.
+    session: u32,
 }
 
 impl Desk {
     fn new(has_model: bool) -> Self {
         let chip = Chip { has_model, resets: 0 };
-        Self { watch: Watch::default(), end: DeviceEnd::new(1), chip, now: 0 }
+        Self { watch: Watch::default(), end: DeviceEnd::new(1), chip, now: 0, session: 0 }
     }
 
     /// Has the watch do something, and both ends talk until they have nothing more to say.
     fn act(&mut self, act: impl FnOnce(&mut Watch, u64, &mut Vec<u8>)) -> Vec<Happening> {
-        let Self { watch, end, chip, now } = self;
+        let Self { watch, end, chip, now, .. } = self;
         let mut line = Vec::new();
         act(watch, *now, &mut line);
         while !line.is_empty() {
@@ -67,7 +69,20 @@ impl Desk {
     }
 
     fn connect(&mut self) -> Vec<Happening> {
-        self.act(|watch, now, line| watch.connect(5, now, line))
+        self.session += 5;
+        let session = self.session;
+        self.act(|watch, now, line| watch.connect(session, now, line))
+    }
+
+    /// Lets time pass while the line is cut, and counts how often the silence is told.
+    fn wait(&mut self, seconds: u64) -> usize {
+        let mut silent = 0;
+        for _ in 0..10 * seconds {
+            self.now += 100_000;
+            self.watch.tick(self.now, &mut Vec::new());
+            silent += self.watch.take().iter().filter(|happened| **happened == Happening::Silent).count();
+        }
+        silent
     }
 
     /// Has the chip tell something, which arrives.
@@ -172,18 +187,31 @@ fn another_object_is_begun_once_and_posteriors_are_asked_for_again() {
 
 #[test]
 fn a_silent_chip_is_told_once_in_half_a_minute_and_asked_again() {
-    let (mut watch, mut line) = (Watch::default(), Vec::new());
-    watch.connect(5, 0, &mut line);
-    let mut silent = 0;
-    for tenth in 1..600 {
-        line.clear();
-        watch.tick(100_000 * tenth, &mut line);
-        silent += watch.take().iter().filter(|happened| **happened == Happening::Silent).count();
-    }
-    assert_eq!(silent, 1);
-    let mut desk = Desk { watch, ..Desk::new(true) };
-    desk.now = 70_000_000;
+    let mut desk = Desk::new(true);
+    desk.watch.connect(5, 0, &mut Vec::new());
+    assert_eq!([desk.wait(26), desk.wait(4)], [0, 1]);
+    desk.now += 2_000_000;
     assert_eq!(desk.act(|watch, now, line| watch.tick(now, line))[0], Happening::Connected);
+}
+
+#[test]
+fn a_chip_that_was_silent_in_a_session_is_connected_again_whether_it_heard_the_last_request_or_not() {
+    for is_heard in [false, true] {
+        let mut desk = Desk::new(true);
+        desk.connect();
+        let mut line = Vec::new();
+        desk.watch.reset(desk.now, &mut line);
+        if is_heard {
+            desk.end.receive(&line, &mut desk.chip, |_| {});
+        }
+        assert_eq!((desk.wait(30), desk.chip.resets), (1, u32::from(is_heard)));
+        // What it tells without the line comes late.
+        desk.end.tell(touch(Decision::Undecided), |_| {});
+        desk.now += 2_000_000;
+        let heard = desk.act(|watch, now, line| watch.tick(now, line));
+        assert!(heard[0] == Happening::Connected && heard.contains(&touched("undecided", 2)), "{is_heard}: {heard:?}");
+        assert!(!heard.iter().any(|heard| matches!(heard, Happening::Missed { .. })), "{is_heard}: {heard:?}");
+    }
 }
 
 #[test]

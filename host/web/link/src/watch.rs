@@ -7,9 +7,6 @@ use palpate_shared::link::{
 };
 use serde::Serialize;
 
-/// From the number of a session that ended to the next; odd, so that none comes again soon.
-const SESSION_STEP: u32 = 0x9e37_79b9;
-
 /// Contact times in microseconds; none for a finger that missed.
 type Times = [Option<u32>; 3];
 
@@ -137,7 +134,6 @@ pub(crate) struct Watch {
     end: HostEnd,
     /// Reads the same bytes: the end counts frames of another version and does not say which.
     versions: Decoder,
-    session: u32,
     known: Known,
     /// The request under way.
     asked: Option<Request<'static>>,
@@ -153,7 +149,6 @@ impl Default for Watch {
         Self {
             end: HostEnd::new(HostSettings::default()),
             versions: Decoder::new(),
-            session: 0,
             known: Known::default(),
             asked: None,
             resets: false,
@@ -174,9 +169,14 @@ impl Watch {
     }
 
     pub(crate) fn connect(&mut self, session: u32, now: u64, line: &mut Vec<u8>) {
-        (self.session, self.asked, self.known) = (session, None, Known::default());
-        (self.resets, self.is_doubtful) = (false, false);
+        self.forget();
         self.end.connect(session, now, |bytes| line.extend(bytes));
+    }
+
+    /// Forgets what was known and wanted in a session that has ended.
+    fn forget(&mut self) {
+        (self.asked, self.known) = (None, Known::default());
+        (self.resets, self.is_doubtful) = (false, false);
     }
 
     pub(crate) fn receive(&mut self, bytes: &[u8], now: u64, line: &mut Vec<u8>) {
@@ -222,7 +222,8 @@ impl Watch {
             if error == LinkError::Silent {
                 self.happened.push(Happening::Silent);
             }
-            self.connect(self.session.wrapping_add(SESSION_STEP), now, line);
+            self.forget();
+            self.end.reconnect(now, |bytes| line.extend(bytes));
         }
         if !self.end.is_idle() {
             return;
