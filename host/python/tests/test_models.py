@@ -33,8 +33,8 @@ def test_touches_may_be_tuples_lists_or_arrays(model: palpate.Model) -> None:
         recognizer.reset()
         assert recognizer.push(touch) == expected
     for touch, message in [
-        ((0.0, 0.1), "2 fields"),
-        ((0.0,) * 12, "12 fields"),
+        ((0.0, 0.1), "2 numbers"),
+        ((0.0,) * 12, "12 numbers"),
         ((0.0, -0.1, 0.0), "the time -0.1 is negative"),
         ((0.0, 300.0, 0.0), "300"),
     ]:

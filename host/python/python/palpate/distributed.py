@@ -405,7 +405,7 @@ def _put_together(shards: list[_Job], format: Format) -> dict[str, str]:
     entry = json.loads(records[0]["entry"])
     for field_ in ("touches", "approaches"):
         entry[field_] = sum(json.loads(record["entry"])[field_] for record in records)
-    entry["bytes"], entry["crc32"] = len(content), zlib.crc32(content)
+    entry["crc32"] = zlib.crc32(content)
     return {**records[0], "entry": json.dumps(entry, ensure_ascii=False)}
 
 
