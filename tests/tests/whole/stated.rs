@@ -61,7 +61,7 @@ fn the_firmwares_readme_states_what_the_emulator_counts() {
             readme.after("through the line, ", posed[1], 0);
             readme.after("a frame takes ", frame[0], 0);
             readme.after("bytes, with the pose ", posed[0], 0);
-            readme.after("an\noutcome ", numbers(&lines, "without detail: an outcome of", 0)[0], 0);
+            readme.after("an\noutcome ", numbers(&lines, "without detail: an answer of", 0)[0], 0);
         }
     }
     readme.finish();
