@@ -76,7 +76,7 @@
 //!
 //! [`shared`] (touches, descriptors, the model format) and [`onboard`] (models, recognizers) are the crates that run on
 //! the chip; the host uses the same code. [`progress::Progress`] follows and cancels long calls. Errors are
-//! [`Error`], with a [`Problem`](error::Problem) that can be matched on.
+//! [`Error`], with a [`Kind`](error::Kind) that can be matched on.
 //!
 //! # Features
 //!

@@ -219,7 +219,7 @@ pub struct Recognition {
 ///
 /// # Errors
 /// Results in `out` that were made from something else, unless
-/// [`Settings::replace`]; [`Kind::Cancelled`](palpate::error::Kind::Cancelled); and what capture, training, compiling,
+/// [`Settings::replace`]; [`Kind::Cancelled`]; and what capture, training, compiling,
 /// evaluating or writing return.
 pub fn run(objects: &[Object], settings: &Settings, out: &Path, progress: &dyn Progress) -> Result<Summary> {
     let began = Instant::now();

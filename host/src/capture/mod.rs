@@ -74,7 +74,7 @@ impl Settings {
     /// Refuses settings that make no capture.
     ///
     /// # Errors
-    /// [`Kind::Setting`](crate::error::Kind::Setting) naming the field.
+    /// [`Kind::Setting`] naming the field.
     pub fn check(&self) -> Result<()> {
         if self.threads == Some(0) {
             return Err(Error::setting("threads", 0, "1 or more, or none for all that the machine has"));
@@ -144,7 +144,7 @@ impl Summary {
 ///
 /// # Errors
 /// When a setting is wrong, a mesh cannot be touched, the directory cannot be written, or it holds anything else and
-/// [`Settings::force`] is not set, or recorded touches; [`Kind::Cancelled`](crate::error::Kind::Cancelled) if `progress` cancels it.
+/// [`Settings::force`] is not set, or recorded touches; [`Kind::Cancelled`] if `progress` cancels it.
 pub fn capture(objects: &[Object], settings: &Settings, directory: &Path, progress: &dyn Progress) -> Result<Summary> {
     let start = Instant::now();
     let (objects, scenes) = sampled(objects, settings, progress)?;

@@ -200,7 +200,7 @@ impl<const CELLS: usize, const OBJECTS: usize> Locating for Room<'_, CELLS, OBJE
 /// millimeters; by default twice the range of the maps. The outer fingers reach beyond it by their distance from the middle one.
 ///
 /// # Errors
-/// [`Kind::Setting`](crate::error::Kind::Setting) unless it is from 0 to 1,000 mm.
+/// [`Kind::Setting`] unless it is from 0 to 1,000 mm.
 pub fn workspace(maps: &Maps<'_>, workspace: Option<f64>) -> Result<u32> {
     match workspace {
         None => Ok(2 * maps.range().unsigned_abs()),

@@ -228,7 +228,7 @@ pub struct OfObject {
 ///
 /// # Errors
 /// When maps have no hand, objects are not theirs, or places never become sure;
-/// [`Kind::NotKept`](crate::error::Kind::NotKept) or [`Kind::TooFew`](crate::error::Kind::TooFew) if no threshold keeps the
+/// [`Kind::NotKept`] or [`Kind::TooFew`] if no threshold keeps the
 /// promise.
 pub fn calibrate(
     maps: Maps<'_>,

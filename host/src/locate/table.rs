@@ -78,7 +78,7 @@ impl Contact {
 /// presses, since the three fingers share an error of the hand's position.
 ///
 /// # Errors
-/// With the place of the press: a touch without a position, [`Kind::NotDown`], and more than a quarter of the contacts with
+/// With the place of the press: a touch without a position, [`Kind::NotDown`](crate::error::Kind::NotDown), and more than a quarter of the contacts with
 /// something else. When there are too few presses, their places do not show the slope of the table, or it is not level.
 pub fn bare_table(presses: &[(Place, Touch)], probe: &Probe) -> Result<BareTable> {
     let contacts = contacts(presses, probe)?;

@@ -174,8 +174,8 @@ impl Settings {
 /// of threads. Progress is counted in rounds.
 ///
 /// # Errors
-/// [`Kind::Setting`](crate::error::Kind::Setting) if a setting is out of its range; if there are fewer than two objects or more than 256, a name that no file can hold, an object without touches, or the descriptor
-/// needs a pose that no touch has. All of it is found before the training starts. [`Kind::Cancelled`](crate::error::Kind::Cancelled).
+/// [`Kind::Setting`] if a setting is out of its range; if there are fewer than two objects or more than 256, a name that no file can hold, an object without touches, or the descriptor
+/// needs a pose that no touch has. All of it is found before the training starts. [`Kind::Cancelled`].
 pub fn train(dataset: &Dataset, settings: &Settings, progress: &dyn Progress) -> Result<Ensemble> {
     let shares = dataset.placement_shares();
     if shares.is_empty() {
