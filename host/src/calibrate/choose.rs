@@ -3,16 +3,12 @@
 use super::begin::Seen;
 use super::groups::Bets;
 use super::terms::Terms;
-use super::walk::{Stop, Tally, walk};
+use super::walk::{LOOSEST, STEP, Stop, Tally, grid, walk};
 use crate::error::Result;
 use crate::evidence::{Odds, Sequence, odds_of, totals};
 use palpate_shared::format::Per;
 use rayon::prelude::*;
 
-/// Between two thresholds that are tried, in nats.
-const STEP: f64 = 0.01;
-/// The loosest threshold that is tried, in nats.
-pub(super) const LOOSEST: f64 = 0.05;
 /// Steps at once where names have thresholds of their own.
 const NAMES_STEP: usize = 2;
 /// Steps at once where sequences are cut anew at each.
@@ -183,12 +179,6 @@ impl Steps {
         }
         if odds.is_empty() { Err(Stop::Looser) } else { Ok(Self { odds, starts }) }
     }
-}
-
-/// Margins from `strict` to `loose`.
-pub(super) fn grid(strict: f64, loose: f64) -> impl Iterator<Item = f64> {
-    let steps = ((strict - loose) / STEP).round().max(0.0) as usize;
-    (0..=steps).map(move |step| strict - STEP * step as f64)
 }
 
 /// The odds of a margin as a model stores them for one object.

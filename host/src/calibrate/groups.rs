@@ -13,9 +13,8 @@
 //! sequences for a binomial test: 299 at 1 %. The inverse of the product is thus a p-value, and thresholds are walked over as
 //! binomial tests are, from as many starts ([`walk`](super::walk())).
 
-use super::choose::grid;
 use super::terms::Terms;
-use super::walk::{Tally, Test, of_share};
+use super::walk::{LOOSEST, Tally, Test, grid, of_share};
 use crate::evidence::{self, Odds, Sequence, Unit, odds_of};
 use palpate_shared::format::Per;
 use std::collections::BTreeSet;
@@ -38,7 +37,7 @@ fn group_of(sequence: &Sequence) -> usize {
     sequence.group.unwrap_or(0)
 }
 
-/// The losses of each of so many cases.
+/// The losses of each case.
 fn losses(sequences: &[Sequence], odds: &Odds, (per, cases): (Per, usize), rate: f64) -> Vec<Losses> {
     let of = |sequence: &Sequence| (sequence.object, group_of(sequence), sequence.outcome(odds));
     let mut units = evidence::units(sequences.iter().map(of), per);
@@ -84,7 +83,7 @@ fn fraction(losses: &[f64], groups: f64, rate: f64, confidence: f64) -> f64 {
 fn fractions(learned_on: &[Sequence], cases: (Per, usize), strictest: f64, groups: usize, terms: &Terms) -> Vec<f64> {
     let learned: BTreeSet<usize> = learned_on.iter().map(group_of).collect();
     let mut seen = vec![Losses::default(); cases.1];
-    for margin in grid(strictest, super::choose::LOOSEST).step_by(10) {
+    for margin in grid(strictest, LOOSEST).step_by(10) {
         let losses = losses(learned_on, &Odds::All(odds_of(margin)), cases, terms.rate);
         let is_kept = |losses: &Losses| losses.of.iter().sum::<f64>() <= 0.0;
         if !losses.iter().all(is_kept) {
@@ -110,7 +109,7 @@ pub(super) struct Bets<'s> {
 }
 
 impl<'s> Bets<'s> {
-    /// Bets on the groups of `tested`, for a walk from this margin with so many starts. `learned_on` are sequences of other
+    /// Bets on the groups of `tested`, for a walk from this margin with this number of starts. `learned_on` are sequences of other
     /// groups, which say how to bet; there may be none.
     pub(super) fn new(
         learned_on: &[Sequence],

@@ -190,7 +190,7 @@ impl Foreseen {
         (is_hopeless && names < needed(terms.rate, terms.confidence) as f64).then_some(chosen)
     }
 
-    /// The approaches that so many times the sequences of the recordings take at a threshold, in words. Objects that are hard to
+    /// The approaches that a multiple of the recordings' sequences takes at a threshold, in words. Objects that are hard to
     /// distinguish take more approaches, and as many sequences.
     fn enough(&self, times: f64, step: usize) -> Option<String> {
         let Step { scale, used, .. } = self.steps.get(step)?;

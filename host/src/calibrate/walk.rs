@@ -29,6 +29,17 @@
 //! of successes in independent trials, 1956). How many names are given is taken as given; the simulations of
 //! `calibrate/tests.rs`, whose error rates are known, count how often a promise is broken in the end.
 
+/// Between two thresholds that are tried, in nats.
+pub(super) const STEP: f64 = 0.01;
+/// The loosest threshold that is tried, in nats.
+pub(super) const LOOSEST: f64 = 0.05;
+
+/// Margins from `strict` to `loose`.
+pub(super) fn grid(strict: f64, loose: f64) -> impl Iterator<Item = f64> {
+    let steps = ((strict - loose) / STEP).round().max(0.0) as usize;
+    (0..=steps).map(move |step| strict - STEP * step as f64)
+}
+
 /// Results at a threshold: errors, of cases that could have been errors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {

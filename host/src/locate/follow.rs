@@ -1,8 +1,8 @@
 //! A located approach as a step of evidence, and an object's cells as a follower.
 
-use super::stated::reachable;
+use super::refused::{BELOW, not_down, nowhere, reachable, too_low};
 use super::world::{Aimed, Drawn, Truth};
-use crate::error::{Error, Kind, Result, problem};
+use crate::error::{Error, Result};
 use crate::evidence::{Follower, Sequence, Sequences, Supplier};
 use palpate_onboard::locate::{Approach, AtMost, Effort, Hand, Locator, Maps, Pose, Seen};
 use palpate_onboard::{Familiarity, Stopping, Verdict};
@@ -15,13 +15,11 @@ pub const TOUCHES: usize = 32;
 pub const CELLS: usize = 14_336;
 /// Cells and objects on a host that follows many objects.
 const MANY: usize = 65_536;
-/// Distance below the table at which a finger cannot have stopped, in millimeters.
-pub const BELOW: f64 = 15.0;
 
 /// Heights that a touch met.
 ///
 /// # Errors
-/// When the touch has no position, or one that cannot be of a hand above a table; [`Kind::NotDown`].
+/// When the touch has no position, or one that cannot be of a hand above a table; [`Kind::NotDown`](crate::error::Kind::NotDown).
 pub fn seen(hand: &Hand, touch: &Touch) -> Result<Seen> {
     let position = touch.position().ok_or_else(nowhere)?;
     reachable(["x", "y", "z"].into_iter().zip(position.micrometers.map(|micrometers| f64::from(micrometers) / 1e3)))?;
@@ -32,25 +30,6 @@ pub fn seen(hand: &Hand, touch: &Touch) -> Result<Seen> {
         return Err(too_low(below));
     }
     hand.seen(touch).ok_or_else(not_down)
-}
-
-/// The problem of a touch without a position.
-pub(super) fn nowhere() -> Error {
-    problem!("the touch has no position")
-        .fix("Give twelve columns: times, direction, alignment, and the hand's position in millimeters.")
-}
-
-/// The problem of a finger that stopped below the table.
-pub(super) fn too_low(millimeters: f64) -> Error {
-    problem!("a finger stopped {millimeters:.0} mm below the table")
-        .fix("Give times in seconds, and the position in millimeters above the table.")
-}
-
-/// The problem of a hand that comes from another direction.
-pub(super) fn not_down() -> Error {
-    problem!("it does not come straight down")
-        .fix("Come straight down, and state the direction in the table's frame: its z is at most -0.95.")
-        .as_kind(Kind::NotDown)
 }
 
 /// A locator of the host: with a chip's room for up to 16 objects, with more for more.
@@ -200,7 +179,7 @@ impl<const CELLS: usize, const OBJECTS: usize> Locating for Room<'_, CELLS, OBJE
 /// millimeters; by default twice the range of the maps. The outer fingers reach beyond it by their distance from the middle one.
 ///
 /// # Errors
-/// [`Kind::Setting`] unless it is from 0 to 1,000 mm.
+/// [`Kind::Setting`](crate::error::Kind::Setting) unless it is from 0 to 1,000 mm.
 pub fn workspace(maps: &Maps<'_>, workspace: Option<f64>) -> Result<u32> {
     match workspace {
         None => Ok(2 * maps.range().unsigned_abs()),

@@ -1,7 +1,7 @@
 //! Content of a model of maps, and its file.
 
 use super::follow::{CELLS, TOUCHES};
-use super::write::{no_hand, refused};
+use super::refused::{no_hand, refused};
 use super::{Aimed, Effort, Hand, Maps, Real};
 use crate::calibrate;
 use crate::error::{Error, Place, Result};

@@ -1,9 +1,8 @@
 //! Maps of placements: cast at meshes, or learned from recorded touches with positions.
 
+use super::refused::{not_met, too_large};
 use super::register::recorded;
-use super::shape::not_met;
 use super::surface::{SAME, Surface, TABLE};
-use super::write::too_large;
 use super::{Settings, Standing};
 use crate::error::{Error, Result, problem};
 use crate::probe::approach::Probe;

@@ -18,6 +18,7 @@ mod learn;
 mod lying;
 mod pose;
 mod promise;
+mod refused;
 mod register;
 mod shape;
 #[cfg(test)]
@@ -29,7 +30,7 @@ mod table;
 mod world;
 mod write;
 
-pub use follow::{BELOW, CELLS, Locating, TOUCHES, locating, seen, within, workspace};
+pub use follow::{CELLS, Locating, TOUCHES, locating, seen, within, workspace};
 pub use inspect::{Cost, Inspected, MapsFile, OfPlacement, Promised, hand, inspect, names, stated};
 pub use learn::{cast, learn, probe_of};
 pub use lying::Lying;
@@ -38,13 +39,14 @@ pub use pose::{Off, Until};
 pub use promise::{
     Calibrated, Evaluation, LeftOut, OfObject, Terms, Tested, ToPlace, calibrate, calibrate_recorded, evaluate,
 };
+pub use refused::{BELOW, FARTHEST, no_hand, not_maps, refused};
 pub use shape::{Relief, Sample, Shape, samples};
-pub use stated::{FARTHEST, Heights, row};
+pub use stated::{Heights, row};
 pub use surface::Surface;
 #[cfg(feature = "train")]
 pub use table::{BareTable, Measured, REACH, bare_table};
 pub use world::{Aimed, Drawn, Real, Standing, Truth, World, standing};
-pub use write::{no_hand, not_maps, refused, write};
+pub use write::write;
 
 use crate::error::{Error, Result};
 

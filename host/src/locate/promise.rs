@@ -2,9 +2,9 @@
 
 use super::follow::{Pressed, Pressing};
 use super::pose::{Equivalents, Off, Until};
+use super::refused::{no_hand, refused};
 use super::world::{Aimed, Drawn, Real, Standing, World};
 use super::write::{Restated, restated};
-use super::write::{no_hand, refused};
 use super::{Effort, Hand, Maps, Promised, Seen, TESTED, locating};
 use crate::calibrate::{self, Begin, Chosen, Stop, Way, margin_of, odds_of, promise};
 use crate::error::{Error, Kind, Result, problem};

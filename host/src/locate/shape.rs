@@ -1,11 +1,11 @@
 //! The heights of one object that stands still: what is known of them, what is guessed, and where to touch next.
 
 use super::contacts::{Met, tips};
-use super::follow::nowhere;
 use super::follow::seen;
 use super::grid::{connected, index, pieces, places};
+use super::refused::{not_met, nowhere};
 use super::{Approach, Hand, Lying, Standing};
-use crate::error::{Error, Result, problem};
+use crate::error::Result;
 use crate::mesh::Mesh;
 use crate::probe::approach::{FINGERS, Probe};
 use crate::probe::scene::Scene;
@@ -47,16 +47,6 @@ pub struct Sample {
     pub height: f64,
     /// True for a contact with object or table.
     pub is_contact: bool,
-}
-
-/// The problem of an object, or of its placement where there is one, that no touch met.
-pub(super) fn not_met(object: &str, placement: &str) -> Error {
-    problem!("{object}: no touch met it{}", in_placement(placement)).fix("Touch it, or leave it out.")
-}
-
-/// The placement in words, if there is one.
-pub(super) fn in_placement(placement: &str) -> String {
-    if placement.is_empty() { String::new() } else { format!(" in the placement {placement:?}") }
 }
 
 /// Samples of a touch of a probe in millimeters. A missing finger met nothing within the stroke, or its contact was lost.

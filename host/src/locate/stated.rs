@@ -1,15 +1,11 @@
 //! Approaches as numbers, and their limits: the same for touches of a file and for heights of a program.
 
-use super::follow::BELOW;
-use super::follow::too_low;
+use super::refused::{BELOW, reachable, too_low};
 use super::shape::Sample;
 use super::{Hand, Seen};
-use crate::error::{Error, Result, problem};
+use crate::error::{Error, Result};
 use crate::touches::touch_of_seconds;
 use palpate_onboard::locate::Contact;
-
-/// Farthest place and greatest height, in millimeters: a locator keeps no farther ones.
-pub const FARTHEST: f64 = 2_000.0;
 
 /// Heights above the table that three fingertips met, all lengths in millimeters.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,17 +59,6 @@ impl Heights {
         }
         touch_of_seconds([None; 3], Some([0.0, 0.0, -1.0]), Some(self.row))?;
         Ok(())
-    }
-}
-
-/// Refuses places and heights in millimeters that no locator keeps.
-pub(super) fn reachable(stated: impl IntoIterator<Item = (&'static str, f64)>) -> Result<()> {
-    match stated.into_iter().find(|(_, millimeters)| millimeters.is_nan() || millimeters.abs() > FARTHEST) {
-        Some((what, millimeters)) => Err(problem!(
-            "{what} is {millimeters} mm, and places and heights are at most {FARTHEST} mm from the table's origin"
-        )
-        .fix("State it in millimeters, in a frame whose origin is on the table.")),
-        None => Ok(()),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::Hand;
 use super::contacts::{Met, tips};
-use super::follow::{not_down, nowhere};
+use super::refused::{not_down, nowhere};
 use crate::error::{Error, Place, Result, problem};
 use crate::probe::approach::{FINGERS, Probe};
 use nalgebra::{SMatrix, SVector};

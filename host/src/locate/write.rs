@@ -1,12 +1,11 @@
 //! Surfaces as the bytes that the chip reads.
 
 use super::Settings;
-use super::shape::{in_placement, not_met};
+use super::refused::{not_met, refused, too_large};
 use super::surface::Surface;
 use crate::compile::{self, OwnedSection, file, restated_file};
-use crate::error::{Error, Result, problem};
+use crate::error::{Result, problem};
 use crate::probe::approach::Probe;
-use palpate_onboard::ModelError;
 use palpate_onboard::locate::{BEYOND, DISTANCES, MAPS_LENGTH, Maps, PLACEMENT_LENGTH, WIDTHS, WITHIN};
 use palpate_shared::format::{HeaderBuilder, Length, MAPS_LAYOUT, Promise, Tag, TrainedProbe};
 
@@ -119,29 +118,6 @@ pub(super) struct Restated {
     /// See [`Settings::stretch`].
     pub(super) stretch: u16,
     pub(super) promise: Option<Promise>,
-}
-
-/// The problem of bytes that are no model of maps.
-pub fn refused(error: ModelError) -> Error {
-    problem!("{error}").fix("Train it again; models of trees are for `recognize` without positions.")
-}
-
-/// The problem of maps that state no hand in millimeters.
-pub fn no_hand() -> Error {
-    problem!("the maps do not state the hand that they were learned with")
-        .fix("Train it on a data set whose probe is in millimeters.")
-}
-
-/// The problem of a model of trees where one of maps is needed.
-pub fn not_maps() -> Error {
-    problem!("a model of trees, not of maps")
-        .fix("Make maps (`palpate maps train`), or give what recognizes without positions.")
-}
-
-/// The problem of a placement that is too large for a map.
-pub(super) fn too_large(object: &str, placement: &str) -> Error {
-    problem!("{object}: it is too large for a map{}", in_placement(placement))
-        .fix("Use maps of 2 mm, or leave it out: a map reaches 250 cells from its middle.")
 }
 
 /// The model with other statements.

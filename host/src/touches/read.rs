@@ -30,7 +30,7 @@ pub(super) struct Found {
 /// Reads what is in a directory, or in a log. The sink says whether the reading goes on after a fault.
 ///
 /// # Errors
-/// Those that the sink returns; when a directory or file cannot be read.
+/// Errors of the sink, and when a directory or file cannot be read.
 pub(super) fn read(directory: &Path, sink: &mut dyn Sink) -> Result<Content> {
     if is_log(directory) {
         let objects = with_logs(BTreeMap::new(), &[directory.into()], directory, sink)?;

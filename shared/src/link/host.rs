@@ -150,7 +150,7 @@ impl HostEnd {
         self.put(Request::Hello { previous: 0, boot: 0 }, now, send);
     }
 
-    /// As [`connect`](Self::connect), where a session has ended, with the number that follows. A number that the chip may know already would
+    /// Connects again after a session has ended, like [`connect`](Self::connect), with the number that follows. A number that the chip may know already would
     /// not do: it takes the hello for a request of that session, and does not answer it, or refuses it.
     pub fn reconnect(&mut self, now: u64, send: impl FnMut(&[u8])) {
         self.connect(self.session.wrapping_add(SESSION_STEP), now, send);

@@ -235,7 +235,7 @@ impl Arguments {
         Ok(is_code)
     }
 
-    /// The files that are read, none of which may be written.
+    /// The files that are read; the output must not be one of them.
     fn inputs(&self) -> impl Iterator<Item = &PathBuf> {
         std::iter::once(&self.ensemble).chain(self.rows())
     }

@@ -31,7 +31,7 @@ pub(crate) struct TeachArguments {
 }
 
 impl TeachArguments {
-    /// The files that are read, none of which may be written.
+    /// The files that are read; the output must not be one of them.
     pub(crate) fn files(&self) -> Vec<PathBuf> {
         self.recorded.files().into_iter().chain(self.extend.clone()).collect()
     }
@@ -52,7 +52,7 @@ impl RecordedArguments {
         Ok(all)
     }
 
-    /// The files that are read, none of which may be written.
+    /// The files that are read; the output must not be one of them.
     pub(crate) fn files(&self) -> Vec<PathBuf> {
         let of = |path: &PathBuf| if path.is_dir() { super::files_of(path) } else { vec![path.clone()] };
         self.teach.iter().flat_map(of).collect()

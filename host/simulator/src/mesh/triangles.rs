@@ -21,7 +21,7 @@ pub(crate) fn no_extent() -> Error {
     problem!("the mesh has no extent: each of its faces is a single point").fix(WITH_FACES)
 }
 
-/// A mesh has more vertices than an index can tell apart.
+/// The problem of a mesh with more vertices than an index can number.
 pub(super) fn too_many_vertices() -> Error {
     problem!("the mesh has more than 4294967295 vertices").fix("Simplify the mesh, or export it in parts.")
 }

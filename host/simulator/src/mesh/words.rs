@@ -38,7 +38,7 @@ pub(super) fn missing(axis: char) -> Error {
     problem!("a vertex without {axis}").fix(CORRECT)
 }
 
-/// A face names a vertex, counted from 0, that is negative or not among so many.
+/// The problem of a face that names a vertex, counted from 0, that the mesh does not have.
 pub(super) fn no_such_vertex(index: impl Into<i64>, vertices: u64) -> Error {
     let index = index.into();
     problem!("vertex {index} of a face is missing: there are {vertices} vertices, counted from 0").fix(EXPORT)

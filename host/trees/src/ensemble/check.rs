@@ -34,7 +34,7 @@ impl Ensemble {
             return Err(problem!("it has {finite} finite base margins for {objects} objects").fix(DAMAGED));
         }
         if self.trees.is_empty() {
-            return Err(no_trees());
+            return Err(faults::no_trees());
         }
         let features = self.inputs.count();
         let infinite = self.schema().is_none();
@@ -103,7 +103,7 @@ fn check_features(names: &[String], ensemble: &Ensemble) -> Result<()> {
             Node::Leaf(_) => None,
         });
         let used = splits.collect::<HashSet<_>>().len();
-        return Err(feature_count(names.len(), used));
+        return Err(faults::feature_count(names.len(), used));
     }
     for name in names {
         if name.len() > MAX_NAME || name.chars().any(char::is_control) {
@@ -122,17 +122,6 @@ const NAMES: &str = "Use 2 to 256 different names of at most 255 bytes, without 
 /// A number of objects that no ensemble can have.
 pub(super) fn object_count(count: usize) -> Error {
     problem!("it names {count} objects").fix(NAMES)
-}
-
-/// More features in trees than a model can have, or none at all.
-pub(super) fn feature_count(count: usize, used: usize) -> Error {
-    problem!("its trees use {used} of its {count} features, and not 1 to {MAX_FEATURES}")
-        .fix(format!("Train on the features that matter, at most {MAX_FEATURES}."))
-}
-
-/// An ensemble that adds nothing.
-pub(super) fn no_trees() -> Error {
-    problem!("it has no trees").fix(DAMAGED)
 }
 
 /// Returns an error unless these names can be an ensemble's objects.

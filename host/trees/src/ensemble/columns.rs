@@ -1,7 +1,6 @@
 //! Features of an ensemble among the columns of its file: with names that a model can hold, and no more than it can have.
 
-use super::check::feature_count;
-use super::import::damaged;
+use super::faults::{damaged, feature_count};
 use super::{Columns, Inputs, MAX_FEATURES, Node, Tree};
 use crate::error::{Result, problem};
 use std::collections::BTreeSet;

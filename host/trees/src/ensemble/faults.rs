@@ -1,5 +1,6 @@
 //! Faults of trees that readers of files, the check of an ensemble and the compiler find, in words. Nodes are counted from 0.
 
+use super::MAX_FEATURES;
 use crate::error::{Error, problem};
 use std::fmt::Display;
 
@@ -44,4 +45,21 @@ pub(super) fn column(column: &str, found: usize, wanted: usize) -> Error {
 /// A count that is written as something else.
 pub(super) fn count(name: &str, text: &str) -> Error {
     problem!("{name} is {text:?}, not a count").fix(DAMAGED)
+}
+
+/// More features in trees than a model can have, or none at all.
+pub(crate) fn feature_count(count: usize, used: usize) -> Error {
+    problem!("its trees use {used} of its {count} features, and not 1 to {MAX_FEATURES}")
+        .fix(format!("Train on the features that matter, at most {MAX_FEATURES}."))
+}
+
+/// An ensemble that adds nothing.
+pub(crate) fn no_trees() -> Error {
+    problem!("it has no trees").fix(DAMAGED)
+}
+
+/// A file of another library that contradicts itself.
+pub(crate) fn damaged(kind: &str, what: impl Display) -> Error {
+    problem!("not a whole model in the format {kind}: {what}")
+        .fix("Save the model again with the library that trained it.")
 }

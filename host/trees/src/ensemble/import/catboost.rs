@@ -7,7 +7,7 @@ use super::draft::{Draft, DraftTree};
 use super::draft_node::DraftNode;
 use super::options::CATEGORIES;
 use super::set::Set;
-use crate::ensemble::check::no_trees;
+use crate::ensemble::faults::{self, no_trees};
 use crate::ensemble::{Ensemble, Output, Probability, Threshold};
 use crate::error::{Error, Result, problem};
 use palpate_shared::format::Link;
@@ -149,7 +149,7 @@ impl Test {
 }
 
 fn damaged(what: impl Display) -> Error {
-    super::damaged("CatBoost JSON", what)
+    faults::damaged("CatBoost JSON", what)
 }
 
 /// Reads CatBoost's JSON.

@@ -9,6 +9,7 @@ use super::draft_node::DraftNode;
 use super::options::{CATEGORIES, unknown_objective};
 use super::set::Set;
 use crate::ensemble::check::object_count;
+use crate::ensemble::faults;
 use crate::ensemble::{Ensemble, Output, Probability, Threshold};
 use crate::error::{Error, Place, Result, problem};
 use palpate_shared::format::Link;
@@ -56,7 +57,7 @@ impl<'a> Block<'a> {
 }
 
 fn damaged(place: Place, what: impl Display) -> Error {
-    super::damaged("LightGBM text", what).at(place)
+    faults::damaged("LightGBM text", what).at(place)
 }
 
 /// Reads LightGBM's text; `path` is for errors only.

@@ -34,11 +34,11 @@ mod votes;
 pub use options::Options;
 pub use parts::{PartTree, Parts};
 
+use super::faults::damaged;
 use super::{Ensemble, xgboost};
 use crate::error::{Error, Place, Result, problem};
 use options::MISSING_UNKNOWN;
 pub(crate) use options::asks;
-use std::fmt::Display;
 use std::path::Path;
 
 impl Ensemble {
@@ -194,10 +194,4 @@ fn json_kind(bytes: &[u8]) -> JsonKind {
         Keys { tree_info: Some(_), .. } => JsonKind::LightGbmDump,
         _ => JsonKind::XgBoost,
     }
-}
-
-/// A file of another library that contradicts itself.
-pub(super) fn damaged(kind: &str, what: impl Display) -> Error {
-    problem!("not a whole model in the format {kind}: {what}")
-        .fix("Save the model again with the library that trained it.")
 }

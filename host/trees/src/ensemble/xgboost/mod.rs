@@ -23,7 +23,7 @@ mod schema;
 mod trees;
 mod write;
 
-use super::import::damaged;
+use super::faults::damaged;
 use super::import::options::Options;
 use super::{Ensemble, Schema};
 use crate::error::{Error, Place, Result, problem};

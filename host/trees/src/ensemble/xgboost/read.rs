@@ -4,7 +4,8 @@ use super::objective::{Kind, Objective};
 use super::schema::{Document, Forest, GradientBooster, Learner, TreeColumns};
 use super::trees::{Shape, has_sets, tree};
 use super::without_trees;
-use crate::ensemble::check::{check_names, no_trees};
+use crate::ensemble::check::check_names;
+use crate::ensemble::faults::no_trees;
 use crate::ensemble::faults::{self, DAMAGED};
 use crate::ensemble::import::options::{
     CATEGORIES, MISSING_UNKNOWN, Options, STOPPED_EARLY, default_names, named, one_class, unknown_objective,

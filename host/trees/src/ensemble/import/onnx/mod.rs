@@ -24,7 +24,7 @@ pub(super) fn is_onnx(bytes: &[u8]) -> bool {
 }
 
 fn damaged(what: impl Display) -> Error {
-    super::damaged("ONNX", what)
+    crate::ensemble::faults::damaged("ONNX", what)
 }
 
 /// Reads an ONNX file.
