@@ -323,7 +323,7 @@ impl Maps {
         (0..=u8::MAX).take(maps.placements()).map(of).collect()
     }
 
-    /// The hand that they were learned with, in millimeters.
+    /// The hand that they were made with, in millimeters.
     #[getter]
     fn probe(&self) -> Result<Probe, Failure> {
         Ok(Probe(locate::hand(self.maps())?))

@@ -205,9 +205,7 @@ impl Connection {
         let fix = match refusal {
             Refusal::NoModel => NO_MODEL,
             Refusal::NoObject => "Load the model again.",
-            Refusal::Position => {
-                "Load maps, which `palpate train` makes of touches with a position, or leave positions out."
-            }
+            Refusal::Position => "Load maps, which `palpate maps train` makes, or leave positions out.",
             _ => OTHER_VERSION,
         };
         self.wrong(format!("the chip refuses: {refusal}"), fix)

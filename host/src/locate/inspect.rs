@@ -50,7 +50,7 @@ pub fn names(maps: &Maps<'_>) -> Vec<String> {
     (0..maps.objects()).map(|object| maps.object_name(object).to_owned()).collect()
 }
 
-/// The probe that maps were learned with, in millimeters.
+/// The probe that maps were made with, in millimeters.
 ///
 /// # Errors
 /// When the maps state no hand.

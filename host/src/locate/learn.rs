@@ -92,7 +92,7 @@ fn of_object(object: usize, touches: &ObjectTouches, probe: &Probe, settings: &S
 /// The probe of a data set, at true size.
 ///
 /// # Errors
-/// Unless it states one in millimeters.
+/// When it states none in millimeters.
 pub fn probe_of(dataset: &Dataset) -> Result<Probe> {
     let origin = dataset.origin.as_ref();
     let origin = origin.filter(|origin| origin.unit == Length::Millimeter).ok_or_else(|| {

@@ -50,13 +50,14 @@ fn in_placement(placement: &str) -> String {
 
 /// The problem of bytes that are no model of maps.
 pub fn refused(error: ModelError) -> Error {
-    problem!("{error}").fix("Train it again; models of trees are for `recognize` without positions.")
+    problem!("{error}")
+        .fix("Make the maps again (`palpate maps train`); models of trees are for `recognize` without positions.")
 }
 
 /// The problem of maps that state no hand in millimeters.
 pub fn no_hand() -> Error {
-    problem!("the maps do not state the hand that they were learned with")
-        .fix("Train it on a data set whose probe is in millimeters.")
+    problem!("the maps do not state the hand that they were made with")
+        .fix("Make them again with a probe in millimeters (`palpate maps train --probe`).")
 }
 
 /// The problem of a model of trees where one of maps is needed.

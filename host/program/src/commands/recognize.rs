@@ -127,8 +127,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         return Err(of_model(raw_features()));
     }
     if arguments.next {
-        let allowed =
-            "it with a model of maps (palpate train on touches with a position); for a model with a plan, use --active";
+        let allowed = "it with a model of maps (palpate maps train); for a model with a plan, use --active";
         return Err(Error::setting("next", "given", allowed));
     }
     if arguments.active && model.plan().is_none() {

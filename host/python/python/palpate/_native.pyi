@@ -381,7 +381,7 @@ class Maps:
     @property
     def probe(self, /) -> Probe:
         """
-        The hand that they were learned with, in millimeters.
+        The hand that they were made with, in millimeters.
         """
     @property
     def promise(self, /) -> Any | None:
