@@ -169,21 +169,15 @@ impl Folder {
         self.unfinished.path()
     }
 
-    /// Puts the directory in its place. Of one that is there, these files are removed, and others stay.
+    /// Puts the directory in its place. Of one that is there, these files are removed, by their paths in it, and others stay.
     ///
     /// # Errors
     /// [`Kind::Io`](crate::error::Kind::Io) naming the directory.
-    pub fn finish(self, replaced: &[String]) -> Result<()> {
+    pub fn finish(self, replaced: &[PathBuf]) -> Result<()> {
         let Self { unfinished, place } = self;
         let put = || {
             if place.is_dir() {
-                for entry in std::fs::read_dir(&place)? {
-                    let (name, path) = entry.map(|entry| (entry.file_name(), entry.path()))?;
-                    let moved = unfinished.path().join(&name);
-                    if !replaced.iter().any(|own| name == own.as_str()) && !moved.exists() {
-                        std::fs::rename(path, moved)?;
-                    }
-                }
+                keep_others(&place, unfinished.path(), Path::new(""), replaced)?;
                 std::fs::remove_dir_all(&place)?;
             }
             std::fs::rename(unfinished.path(), &place)
@@ -193,6 +187,27 @@ impl Folder {
         _ = unfinished.keep();
         Ok(())
     }
+}
+
+/// Moves what the directory `inner` below `from` holds to where it is below `to`, except the files `replaced` and what is there
+/// already.
+fn keep_others(from: &Path, to: &Path, inner: &Path, replaced: &[PathBuf]) -> std::io::Result<()> {
+    for entry in std::fs::read_dir(from.join(inner))? {
+        let path = inner.join(entry?.file_name());
+        let moved = to.join(&path);
+        if replaced.contains(&path) {
+            continue;
+        }
+        if replaced.iter().any(|own| own.starts_with(&path)) {
+            std::fs::create_dir_all(&moved)?;
+            keep_others(from, to, &path, replaced)?;
+            // Of a directory that held nothing else, nothing stays.
+            _ = std::fs::remove_dir(&moved);
+        } else if !moved.exists() {
+            std::fs::rename(from.join(&path), moved)?;
+        }
+    }
+    Ok(())
 }
 
 /// Refuses to write onto what is being read, before any work is done: the file `output` must be none of the `inputs`.
@@ -408,7 +423,7 @@ mod tests {
         let written = |names: &[&str], replaced: &[&str]| {
             let folder = Folder::begin(&place).unwrap();
             names.iter().for_each(|name| std::fs::write(folder.path().join(name), *name).unwrap());
-            folder.finish(&replaced.iter().map(ToString::to_string).collect::<Vec<_>>()).unwrap();
+            folder.finish(&replaced.iter().map(PathBuf::from).collect::<Vec<_>>()).unwrap();
         };
         let unfinished = Folder::begin(&place).unwrap();
         std::fs::write(unfinished.path().join("a.txt"), "").unwrap();

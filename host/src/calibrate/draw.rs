@@ -45,7 +45,7 @@ impl<'d> TouchSupply<'d> {
     /// instance, by one robot. Where robots differ, every robot makes one sequence, so that the sequences' biases are
     /// independent.
     pub(crate) fn new(object: usize, touched: &'d ObjectTouches, seed: u64) -> Self {
-        let pools = touched.pools().into_iter().map(|pool| pool.touches).collect();
+        let pools = touched.pools().iter().map(|pool| pool.range.clone().map(|touch| touch as u32).collect()).collect();
         let supply = Self::of(object, Feed::Given(touched.touches()), pools);
         let is_once = touched.has_robots();
         if is_once { Self { is_once, ..supply } } else { supply.shuffled(&touched.name, seed) }

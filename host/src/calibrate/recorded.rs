@@ -107,7 +107,7 @@ pub fn calibrate_recorded(
 
 /// Recordings or logs that a data set's touches are of; none where it does not say.
 fn recordings(dataset: &Dataset) -> Option<usize> {
-    let of = |source: &&Source| matches!(source, Source::Recording(_) | Source::Log(_));
+    let of = |source: &&&Source| matches!(source, Source::Recording(_) | Source::Log(_));
     let count = dataset.objects.iter().map(|object| object.sources().iter().filter(of).count()).sum();
     (count > 0).then_some(count)
 }

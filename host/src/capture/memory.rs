@@ -26,7 +26,7 @@ pub fn in_memory(objects: &[Object], settings: &Settings, progress: &dyn Progres
         all.push(touches);
         Ok(())
     };
-    let summaries = pipeline::run(&samplers, settings, |touches| touches, to_memory, progress)?;
+    let summaries = pipeline::run(&samplers, settings, |_, _, touches| touches, to_memory, progress)?;
     let (origin, first) = (&settings.origin, settings.origin.samples().start);
     let touched = objects.iter().zip(&scenes).zip(all).map(|((object, scenes), touches)| {
         ObjectTouches::in_turn(&object.name, touches, &sources(object, scenes), first).of_origin(origin)

@@ -38,15 +38,14 @@ use crate::mesh::{Instance, Object, placements};
 use crate::probe::approach::FINGERS;
 use crate::probe::scene::{Scene, Table};
 use crate::progress::{self, Progress};
-use crate::touches::{Entry, Listing, Lying, ObjectTouches, Origin, Source, Writer, write_touch};
+use crate::touches::{Entry, Listing, ObjectTouches, Origin, PoolFile, Source, Writer, write_touch};
 use crate::wording::first_ten;
 use palpate_shared::Touch;
 use palpate_shared::format::Length;
 use rayon::prelude::*;
-use std::fs::DirEntry;
 use std::io::ErrorKind;
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 pub use memory::in_memory;
@@ -139,7 +138,8 @@ impl Summary {
     }
 }
 
-/// Touches the objects and writes `DIR/<object>.txt` for each, and `DIR/dataset.json`. The directory appears when all is done.
+/// Touches the objects and writes `DIR/<object>.txt` for each, or a file for each of its instances or placements
+/// (`DIR/<object>/1.txt` and so on), and `DIR/dataset.json`. The directory appears when all is done.
 /// The same capture may be repeated.
 ///
 /// # Errors
@@ -150,66 +150,74 @@ pub fn capture(objects: &[Object], settings: &Settings, directory: &Path, progre
     let (objects, scenes) = sampled(objects, settings, progress)?;
     let samplers = samplers(&objects, &scenes, &settings.origin);
     untouched(&samplers, &settings.origin).map_or(Ok(()), Err)?;
-    let entries = objects.iter().zip(&scenes).map(|(object, scenes)| entry(object, scenes, &settings.origin)).collect();
-    let listing = Listing { objects: entries, ..Listing::new(&settings.origin, []) };
+    let entry = |(object, scenes): (&&Object, &Vec<Scene>)| entry(object, scenes, &settings.origin);
+    let entries: Vec<Entry> = objects.iter().zip(&scenes).map(entry).collect();
+    let listing = Listing { objects: entries.clone(), ..Listing::new(&settings.origin, []) };
     let replaced = replaced(directory, &listing, settings.force)?;
     let mut writer = Writer::begin(directory, listing)?;
-    let lines = |touches: Vec<Touch>| {
-        let mut lines = String::new();
-        touches.iter().for_each(|touch| write_touch(&mut lines, touch, settings.origin.pose));
-        lines
+    let pools = |object: usize| entries[object].pools.len();
+    // Touches of sources in turn, as lines of each.
+    let to_lines = |object: usize, samples: Range<u64>, touches: Vec<Touch>| {
+        let mut pools = vec![(String::new(), 0); pools(object)];
+        for (sample, touch) in samples.zip(&touches) {
+            let turn = (sample % pools.len() as u64) as usize;
+            write_touch(&mut pools[turn].0, touch, settings.origin.pose);
+            pools[turn].1 += 1;
+        }
+        pools
     };
-    let to_file = |object: usize, chunks: &mut pipeline::Chunks<'_, String>| {
-        let mut file = writer.file(object)?;
+    let to_files = |object: usize, chunks: &mut pipeline::Chunks<'_, Vec<(String, u64)>>| {
+        let mut files = writer.object(object)?;
+        let mut approaches = 0;
         for chunk in chunks {
             let pipeline::Chunk { packed, counts } = chunk?;
-            file.write(&packed, counts.touches, counts.approaches)?;
+            approaches += counts.approaches;
+            for (pool, (lines, touches)) in packed.into_iter().enumerate() {
+                files.write(pool, &lines, touches)?;
+            }
         }
-        file.close()
+        files.close(approaches)
     };
-    let objects = pipeline::run(&samplers, settings, lines, to_file, progress)?;
+    let objects = pipeline::run(&samplers, settings, to_lines, to_files, progress)?;
     writer.finish(true, &replaced)?;
     Ok(Summary { objects, seconds: start.elapsed().as_secs_f64() })
 }
 
-/// The names of the files in the directory that a capture with this listing replaces.
+/// The files in the directory that a capture with this listing replaces, by their paths in it.
 ///
 /// # Errors
 /// When recorded touches are there; [`Kind::Exists`] if something else than this capture's own touches is there, unless it is
 /// forced.
-fn replaced(directory: &Path, wanted: &Listing, force: bool) -> Result<Vec<String>> {
-    let io = |source| Error::io(directory, "list", source);
-    let there = match std::fs::read_dir(directory) {
-        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
-        entries => entries.map_err(io)?,
-    };
-    let name = |entry: std::io::Result<DirEntry>| Ok(entry.map_err(io)?.file_name().to_string_lossy().into_owned());
-    let mut there: Vec<String> = there.map(name).collect::<Result<_>>()?;
-    there.sort();
+fn replaced(directory: &Path, wanted: &Listing, force: bool) -> Result<Vec<PathBuf>> {
     let found = match Listing::read(directory) {
         // What cannot be read says nothing of other files.
         Err(error) if force && !error.is(&Kind::Io) => None,
         found => found?,
     };
-    let mut own = vec![Listing::FILE.to_owned()];
+    let mut own = vec![PathBuf::from(Listing::FILE)];
     if let Some(found) = &found {
         if found.is_recorded() {
             // No capture could make them again.
-            let touches: u64 = found.objects.iter().map(|entry| entry.touches).sum();
+            let touches: u64 = found.objects.iter().map(Entry::touches).sum();
             return Err(problem!("holds {touches} recorded touches of {}", first_ten(&found.names()))
                 .fix("Give another directory: recorded and simulated touches are not mixed.")
                 .at(Place::file(directory)));
         }
-        let file = |entry: &Entry| entry.file(Path::new("")).to_string_lossy().into_owned();
-        own.extend(found.objects.iter().map(file));
+        own.extend(found.paths(Path::new("")));
     }
     // Regardless of the version, and of what only the capture tells.
     let stated = |listing: &Listing| {
-        let of = |entry: &Entry| Entry { touches: 0, approaches: 0, crc32: None, ..entry.clone() };
+        let pool = |pool: &PoolFile| PoolFile { touches: 0, crc32: None, ..pool.clone() };
+        let of = |entry: &Entry| {
+            let pools = entry.pools.iter().map(pool).collect();
+            Entry { approaches: 0, pools, ..entry.clone() }
+        };
         (listing.origin.clone(), listing.objects.iter().map(of).collect::<Vec<_>>())
     };
     let is_same = found.is_some_and(|found| stated(&found) == stated(wanted));
-    let others: Vec<String> = there.into_iter().filter(|name| !is_same || !own.contains(name)).collect();
+    let mut others = Vec::new();
+    list_others(directory, Path::new(""), if is_same { &own } else { &[] }, &mut others)?;
+    others.sort();
     if !force && !others.is_empty() {
         return Err(problem!("holds {}, which this capture would not write", first_ten(&others))
             .fix("Give another directory, move these away, or replace the touches that are there.")
@@ -217,6 +225,26 @@ fn replaced(directory: &Path, wanted: &Listing, force: bool) -> Result<Vec<Strin
             .at(Place::file(directory)));
     }
     Ok(own)
+}
+
+/// Appends what the directory `inner` below `directory` holds besides these files.
+fn list_others(directory: &Path, inner: &Path, own: &[PathBuf], others: &mut Vec<String>) -> Result<()> {
+    let io = |source| Error::io(directory, "list", source);
+    let entries = match std::fs::read_dir(directory.join(inner)) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
+        entries => entries.map_err(io)?,
+    };
+    for entry in entries {
+        let path = inner.join(entry.map_err(io)?.file_name());
+        if own.contains(&path) {
+            continue;
+        }
+        match own.iter().any(|own| own.starts_with(&path)) {
+            true => list_others(directory, &path, own, others)?,
+            false => others.push(path.to_string_lossy().into_owned()),
+        }
+    }
+    Ok(())
 }
 
 /// The objects of these that cannot be touched with all fingers, as [`Kind::Untouchable`]; none if all can, or if every approach
@@ -259,13 +287,14 @@ fn untouched(samplers: &[Sampler<'_>], origin: &Origin) -> Option<Error> {
 
 /// Entry of the listing for an object before it is touched.
 fn entry(object: &Object, scenes: &[Scene], origin: &Origin) -> Entry {
+    let sources = match &sources(object, scenes)[..] {
+        [] => vec![Source::Object],
+        sources => sources.to_vec(),
+    };
     Entry {
-        name: object.name.clone(),
-        instances: named(object),
-        placements: sources(object, scenes).iter().filter_map(Lying::of).collect(),
         meshes: object.instances().map(|instance| format!("{:016x}", instance.mesh.checksum())).collect(),
         millimeters: object.millimeters.filter(|_| origin.unit == Length::Millimeter),
-        ..Entry::default()
+        ..Entry::of(&object.name, sources.iter().map(|source| (source, None)))
     }
 }
 
@@ -330,8 +359,9 @@ pub(crate) fn sources(object: &Object, scenes: &[Scene]) -> Vec<Source> {
 fn sources_of(instances: &[String], scenes: &[Scene]) -> Vec<Source> {
     let placement = |scene: &Scene| {
         scene.table().map(|table| {
-            let (instance, name) = (instances.get(table.instance).cloned(), table.placement.clone());
-            Lying { instance, name, weight: table.weight }.source()
+            let (instance, placement) = (instances.get(table.instance).cloned(), table.placement.clone());
+            let millionths = (table.weight * 1e6).round().clamp(0.0, 1e6) as u32;
+            Source::Placement { instance, placement, millionths }
         })
     };
     let placements: Vec<Source> = scenes.iter().filter_map(placement).collect();

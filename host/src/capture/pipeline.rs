@@ -39,7 +39,7 @@ pub(super) type Chunks<'c, T> = dyn Iterator<Item = Result<Chunk<T>>> + 'c;
 pub(super) fn run<T: Send>(
     samplers: &[Sampler<'_>],
     settings: &Settings,
-    pack: impl Fn(Vec<Touch>) -> T + Sync,
+    pack: impl Fn(usize, Range<u64>, Vec<Touch>) -> T + Sync,
     mut take: impl FnMut(usize, &mut Chunks<'_, T>) -> Result<()>,
     progress: &dyn Progress,
 ) -> Result<Vec<ObjectSummary>> {
@@ -57,7 +57,10 @@ pub(super) fn run<T: Send>(
             let started = started.clone();
             let work = move || {
                 if started.recv().is_ok() {
-                    let make = |object: usize, samples| compute(&samplers[object], settings, samples, pack, progress);
+                    let make = |object: usize, samples: Range<u64>| {
+                        let pack = |touches| pack(object, samples.clone(), touches);
+                        compute(&samplers[object], settings, samples.clone(), pack, progress)
+                    };
                     produce(chunks, make, &sender);
                 }
             };

@@ -1,7 +1,7 @@
 //! Steps that are streamed to a chip: touches, and where one object ends and the next begins.
 
 use crate::error::Result;
-use crate::touches::{Dataset, Log, ObjectTouches, Pool, text};
+use crate::touches::{Dataset, Log, text};
 use palpate_shared::Touch;
 use std::io::BufRead;
 use std::path::Path;
@@ -25,8 +25,6 @@ pub enum Steps {
         length: usize,
         /// Touches still to come.
         left: u64,
-        /// For each object, the touches that may follow each other.
-        pools: Vec<Vec<Pool>>,
         /// Indices of the sequence and of its touch.
         at: (usize, usize),
     },
@@ -41,8 +39,7 @@ impl Steps {
     /// of the first. An object's touches begin again when they are used up. Those of a sequence are of one source, such as
     /// an instance; sources take turns.
     pub fn sequences(dataset: Dataset, length: usize, count: u64) -> Self {
-        let pools = dataset.objects.iter().map(ObjectTouches::pools).collect();
-        Self::Sequences { dataset: dataset.into(), length: length.max(1), left: count, pools, at: (0, 0) }
+        Self::Sequences { dataset: dataset.into(), length: length.max(1), left: count, at: (0, 0) }
     }
 
     /// Lines as in a data set's files, until they end.
@@ -83,22 +80,22 @@ impl Steps {
     /// When a line is not a touch.
     pub fn next_step(&mut self) -> Result<Option<Step>> {
         match self {
-            Self::Sequences { dataset, length, left, pools, at: (sequence, touch) } => {
+            Self::Sequences { dataset, length, left, at: (sequence, touch) } => {
                 if *left == 0 {
                     return Ok(None);
                 }
                 let objects = dataset.objects.len();
                 let number = *sequence % objects.max(1);
-                let Some((object, pools)) = dataset.objects.get(number).zip(pools.get(number)) else { return Ok(None) };
+                let Some(object) = dataset.objects.get(number) else { return Ok(None) };
+                let pools = object.pools();
                 if *touch == 0 {
                     *touch = 1;
                     return Ok(Some(Step::Object(Some(object.name.clone()))));
                 }
                 let round = *sequence / objects;
-                let own = pools.get(round % pools.len().max(1)).map_or(&[][..], |pool| &pool.touches);
+                let own = pools.get(round % pools.len().max(1)).map_or(&[][..], |pool| object.of_pool(pool));
                 let index = (round / pools.len().max(1)) * *length + *touch - 1;
-                let next =
-                    own.get(index % own.len().max(1)).and_then(|&next| object.touches().get(next as usize)).copied();
+                let next = own.get(index % own.len().max(1)).copied();
                 *left -= 1;
                 (*sequence, *touch) = if touch == length { (*sequence + 1, 0) } else { (*sequence, *touch + 1) };
                 Ok(next.map(Step::Touch))

@@ -40,10 +40,8 @@ pub fn cost_of_noise(dataset: &Dataset, settings: &train::Settings, noise: &Nois
         return Ok(None);
     }
     let split = folds::split(dataset, 0.2, settings.seed)?;
-    let [train_part, mut test] = [(&split.train, MOST[0]), (&split.test, MOST[1])].map(|(part, most)| {
-        // In the order of a split, any stretch has the same share of each instance.
-        part.each(|object| object.select(0..most))
-    });
+    let [train_part, mut test] = [(&split.train, MOST[0]), (&split.test, MOST[1])]
+        .map(|(part, most)| part.each(|object| object.part(0.0, most as f64 / object.len().max(most) as f64)));
     let clean = train::Settings { noise: Noise::default(), rounds: settings.rounds.min(ROUNDS), ..settings.clone() };
     let ensemble = train(&train_part, &clean, &())?;
     let accuracy = |test: &Dataset| -> Result<f64> {

@@ -7,7 +7,7 @@ use crate::ensemble::{OverTouches, StatedProbe, TouchOrigin, feature_row, object
 use crate::error::{Error, Result, problem};
 use crate::probe::hand;
 use crate::random::{self, Purpose};
-use crate::touches::{Dataset, ObjectTouches};
+use crate::touches::{Dataset, ObjectTouches, Pool};
 use palpate_onboard::{Model, Recognizer, Refused, Stopping};
 use palpate_shared::format::{TrainedProbe, TrainedTouches};
 use palpate_shared::{Descriptor, Touch};
@@ -483,19 +483,20 @@ impl<'m> Margins<'m> {
 /// Pools of an object's touches; `approaches` says which are evidence.
 fn pools(touched: &ObjectTouches, approaches: &[Option<u32>]) -> Vec<TestedPool> {
     let pools = touched.pools();
-    let evidence = |touches: &[u32]| -> Vec<u32> {
-        touches.iter().filter_map(|&touch| approaches.get(touch as usize).copied().flatten()).collect()
+    let evidence = |pool: &Pool| -> Vec<u32> {
+        let own = approaches.get(pool.range.clone()).unwrap_or_default();
+        own.iter().copied().flatten().collect()
     };
-    let mut fewest = vec![[usize::MAX; 2]; touched.sources().len().max(1)];
-    let found: Vec<(Vec<u32>, usize, Vec<u32>)> =
-        pools.into_iter().map(|pool| (evidence(&pool.touches), pool.source, pool.touches)).collect();
-    for (evidence, source, touches) in &found {
-        let [all, used] = &mut fewest[*source];
-        (*all, *used) = ((*all).min(touches.len()), (*used).min(evidence.len()));
-    }
-    let tested = found.into_iter().map(|(evidence, source, touches)| {
-        let [fewest, fewest_evidence] = fewest[source];
-        TestedPool { touches, evidence, fewest, fewest_evidence }
+    let found: Vec<(&Pool, Vec<u32>)> = pools.iter().map(|pool| (pool, evidence(pool))).collect();
+    let tested = found.iter().map(|(pool, evidence)| {
+        let like = || found.iter().filter(|(other, _)| other.source == pool.source);
+        TestedPool {
+            // A position is below the number of a file's lines.
+            touches: pool.range.clone().map(|touch| touch as u32).collect(),
+            fewest: like().map(|(other, _)| other.range.len()).min().unwrap_or_default(),
+            fewest_evidence: like().map(|(_, evidence)| evidence.len()).min().unwrap_or_default(),
+            evidence: evidence.clone(),
+        }
     });
     tested.collect()
 }

@@ -10,7 +10,7 @@ use crate::error::{Result, problem};
 use crate::evidence::Follower;
 use crate::progress::{self, Progress};
 use crate::random::{self, Purpose};
-use crate::touches::{Dataset, ObjectTouches, Pool};
+use crate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::{Model, Recognizer, Refused, Stopping, Verdict};
 use palpate_shared::Touch;
 use rand::RngExt;
@@ -80,15 +80,15 @@ pub fn parity(
     let is_evidence: Vec<bool> = touches.iter().map(|touch| Refused::check(&trained, touch).is_ok()).collect();
     let firsts: Vec<usize> =
         dataset.objects.iter().scan(0, |next, object| Some(std::mem::replace(next, *next + object.len()))).collect();
-    let pools: Vec<Vec<Pool>> = dataset.objects.iter().map(ObjectTouches::pools).collect();
     progress.begin("verdicts", Some(sequences as u64));
     let runs = (0..sequences).into_par_iter().map(|index| -> Result<_> {
         progress::advance(progress, 1)?;
         let mut rng = random::generator(seed, Purpose::Sequences, "", index as u64);
         let object = rng.random_range(0..dataset.objects.len());
-        let pool = &pools[object][index % pools[object].len()].touches;
+        let pools = dataset.objects[object].pools();
+        let pool = &pools[index % pools.len()].range;
         let draw = std::iter::repeat_with(|| {
-            let index = firsts[object] + pool[rng.random_range(0..pool.len())] as usize;
+            let index = firsts[object] + rng.random_range(pool.clone());
             is_evidence[index].then(|| (full.of(index), &compiled[row(index, objects)]))
         });
         compare_verdicts::<CAPACITY>(ensemble, model, draw)

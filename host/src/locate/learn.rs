@@ -6,7 +6,7 @@ use super::surface::{SAME, Surface, TABLE};
 use super::{Settings, Standing};
 use crate::error::{Error, Result, problem};
 use crate::probe::approach::Probe;
-use crate::touches::{Dataset, ObjectTouches};
+use crate::touches::{Dataset, ObjectTouches, Pool};
 use palpate_shared::Touch;
 use palpate_shared::format::Length;
 use rayon::prelude::*;
@@ -57,15 +57,11 @@ fn of_object(object: usize, touches: &ObjectTouches, probe: &Probe, settings: &S
             .fix("State the position of every touch, or of none: the last three columns of a line."));
     }
     let placements = touches.placement_weights().unwrap_or_else(|| vec![(String::new(), 1.0)]);
-    let by_source = touches.by_source();
     let mut surfaces: Vec<Surface> = Vec::new();
     for (placement, share) in placements {
-        let is_own =
-            |source: &usize| placement.is_empty() || touches.sources()[*source].placement() == Some(&placement);
-        let recordings: Vec<Vec<Touch>> = (0..touches.sources().len())
-            .filter(is_own)
-            .map(|source| by_source[source].iter().map(|touch| touches.touches()[*touch]).collect())
-            .collect();
+        let is_own = |pool: &&Pool| placement.is_empty() || pool.source.placement() == Some(&placement);
+        let recordings: Vec<Vec<Touch>> =
+            touches.pools().iter().filter(is_own).map(|pool| touches.of_pool(pool).to_vec()).collect();
         let named = |error: Error| match placement.is_empty() {
             true => error,
             false => error.within(format_args!("{placement}: ")),

@@ -311,13 +311,13 @@ pub fn calibrate_recorded(
     let (plain_maps, names) = (opened(&bytes)?, super::names(&maps));
     // Recorded touches have noise of their own.
     let terms = &Terms { aimed: Aimed::Random, real: Real::like(&Noise::default(), probe.speed), ..*terms };
-    let of = |(index, (touches, pool)): (u64, (&ObjectTouches, Pool))| -> Result<Vec<Sequence>> {
+    let of = |(index, (touches, pool)): (u64, (&ObjectTouches, &Pool))| -> Result<Vec<Sequence>> {
         progress::advance(progress, 1)?;
-        let is_down = |touch: &u32| match super::seen(&hand, &touches.touches()[*touch as usize]) {
+        let is_down = |touch| match super::seen(&hand, touch) {
             Err(error) if error.is(&Kind::NotDown) => Ok(None),
             seen => seen.map(Some),
         };
-        let mut steps = pool.touches.iter().map(is_down).collect::<Result<Vec<_>, _>>()?;
+        let mut steps = touches.of_pool(pool).iter().map(is_down).collect::<Result<Vec<_>, _>>()?;
         let mut random = random::generator(terms.seed, Purpose::Calibration, &touches.name, index);
         steps.shuffle(&mut random);
         let class = names.iter().position(|name| *name == touches.name).unwrap_or(usize::MAX);
@@ -328,7 +328,7 @@ pub fn calibrate_recorded(
         let group = usize::try_from(index).ok();
         Ok(found.into_iter().map(|sequence| sequence.of_group(group)).collect())
     };
-    let pools = |touches| ObjectTouches::pools(touches).into_iter().map(move |pool| (touches, pool));
+    let pools = |touches| ObjectTouches::pools(touches).iter().map(move |pool| (touches, pool));
     let pools: Vec<_> = (0..).zip(recorded.objects.iter().flat_map(pools)).collect();
     let count = pools.len();
     progress.begin("recordings", Some(count as u64));

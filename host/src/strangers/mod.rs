@@ -306,9 +306,8 @@ fn supplies(model: &Model<'_>, dataset: &Dataset, seed: u64) -> Result<Vec<Pools
 /// The touches of an object that may follow each other in a random order.
 fn supply(model: &Model<'_>, touched: &ObjectTouches, seed: u64) -> Pools {
     let is_once = touched.has_robots();
-    let pool = |(turn, pool): (u64, Pool)| {
-        let own = pool.touches.iter().filter_map(|&touch| touched.touches().get(touch as usize));
-        let mut touches: Vec<&Touch> = evidence(model, own).collect();
+    let pool = |(turn, pool): (u64, &Pool)| {
+        let mut touches: Vec<&Touch> = evidence(model, touched.of_pool(pool).iter()).collect();
         if !is_once {
             follow::shuffle(&mut touches, &touched.name, seed, turn);
         }
@@ -336,8 +335,8 @@ fn of_shapes(model: &Model<'_>, shapes: &[ObjectTouches]) -> Vec<Vec<f64>> {
         mean
     };
     let of = shapes.iter().flat_map(|object| {
-        let of = move |pool: Vec<usize>| pool.into_iter().map(|touch| &object.touches()[touch]);
-        object.by_source().into_iter().map(move |pool| evidence(model, of(pool)).collect::<Vec<_>>())
+        let of = move |pool| evidence(model, object.of_pool(pool).iter()).collect::<Vec<_>>();
+        object.pools().iter().map(of)
     });
     // Fewer say less about a shape than about chance.
     of.filter(|touches| touches.len() >= 20).map(mean).collect()

@@ -39,9 +39,10 @@ pub fn alone(
             recorded.objects.iter().map(|object| places(&object.name, object.len(), settings.seed)).collect();
         let fitted = |jitter: f64, is_used: &dyn Fn(f64) -> bool| -> Result<Ensemble> {
             let object = |(object, places): (&ObjectTouches, &Vec<f64>)| {
-                let used = object.select((0..object.len()).filter(|&touch| is_used(places[touch])));
+                let used = object.touches().iter().zip(places).filter(|(_, place)| is_used(**place));
+                let used: Vec<Touch> = used.map(|(touch, _)| *touch).collect();
                 // Copies to train on; no sequence is drawn from them.
-                let touches = repeated(&object.name, used.touches(), jitter, settings.seed);
+                let touches = repeated(&object.name, &used, jitter, settings.seed);
                 ObjectTouches::new(&object.name, touches, Source::Object)
             };
             let objects = recorded.objects.iter().zip(&places).map(object).collect();

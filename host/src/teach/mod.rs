@@ -227,7 +227,7 @@ fn known_touches(ensemble: &Ensemble, known: &Dataset, noise: &Noise, seed: u64)
 
 /// For each source of an object its touches' positions; a group is of touches of one.
 fn by_source(object: &ObjectTouches) -> Vec<Vec<usize>> {
-    object.pools().into_iter().map(|pool| pool.touches.into_iter().map(|touch| touch as usize).collect()).collect()
+    object.pools().iter().map(|pool| pool.range.clone().collect()).collect()
 }
 
 /// For each recorded object the smoothing with the least loss on held-out touches, beside the objects that the trees know.

@@ -3,7 +3,7 @@
 use super::files::{EXTENSION, PARQUET};
 use super::finding::Strict;
 use super::read::{Content, parquet, read};
-use super::{Finding, ObjectTouches, Origin, Recorded, Source, text};
+use super::{Finding, ObjectTouches, Origin, Pool, Source, text};
 use crate::error::{Place, Result, problem};
 use crate::probe::approach::Probe;
 use crate::probe::hand;
@@ -104,25 +104,7 @@ impl Dataset {
 
     /// True if a real probe made touches, as far as the data set states it.
     pub fn is_recorded(&self) -> bool {
-        self.sources().any(|(_, source)| matches!(source, Source::Recording(_)))
-    }
-
-    /// The recordings that the touches are from, with the numbers of touches that are here, in the order in which they
-    /// began; empty for simulated touches, and where that is not known.
-    pub fn recorded(&self) -> Vec<Recorded> {
-        let mut all = Vec::new();
-        for object in &self.objects {
-            for (source, touches) in object.sources().iter().zip(object.by_source()) {
-                let Source::Recording(recorded) = source else { continue };
-                let touches = touches.len() as u64;
-                // The checksum is of all of its lines.
-                let crc32 = recorded.crc32.filter(|_| touches == recorded.touches);
-                all.push(Recorded { touches, crc32, ..recorded.clone() });
-            }
-        }
-        // As text, times are in their order.
-        all.sort_by(|a, b| a.began.cmp(&b.began));
-        all
+        self.pools().any(|pool| matches!(pool.source, Source::Recording(_)))
     }
 
     /// Number of instances, recordings or logs of the objects that have several, by name: all touches of a sequence are
@@ -135,12 +117,11 @@ impl Dataset {
     /// The most touches that a sequence of any object can have: as many as there are of one source, such as an instance, by
     /// one robot.
     pub fn fewest_in_sequence(&self) -> usize {
-        let pools = self.objects.iter().flat_map(ObjectTouches::pools);
-        pools.map(|pool| pool.touches.len()).min().unwrap_or(0)
+        self.pools().map(|pool| pool.range.len()).min().unwrap_or(0)
     }
 
-    fn sources(&self) -> impl Iterator<Item = (&ObjectTouches, &Source)> {
-        self.objects.iter().flat_map(|object| object.sources().iter().map(move |source| (object, source)))
+    fn pools(&self) -> impl Iterator<Item = &Pool> {
+        self.objects.iter().flat_map(|object| object.pools())
     }
 
     /// Reads the data set in a directory: the files that its `dataset.json` names and no other, or, without one, every
@@ -253,12 +234,12 @@ mod tests {
         let origin = Origin { touches: 3, ..Origin::default() };
         let mut listing = Listing::new(&origin, ["fork".into(), "spoon".into()]);
         for (index, entry) in listing.objects.iter_mut().enumerate() {
-            let path = entry.file(directory.path());
+            let path = entry.path(directory.path(), &entry.pools[0]);
             let touch = |i: u32| Touch::from_micros([0, i, index as u32]);
             let mut text = String::new();
             (0..3).for_each(|i| super::super::write_touch(&mut text, &touch(i), false));
-            entry.touches = 3;
-            entry.crc32 = Some(CRC.checksum(text.as_bytes()));
+            entry.pools[0].touches = 3;
+            entry.pools[0].crc32 = Some(CRC.checksum(text.as_bytes()));
             std::fs::write(&path, text).unwrap();
         }
         listing.write(directory.path()).unwrap();

@@ -3,6 +3,7 @@
 use crate::error::{Error, Result, problem};
 use crate::random::{self, Purpose};
 use crate::touches::{Dataset, ObjectTouches};
+use palpate_shared::Touch;
 use rand::seq::SliceRandom;
 use std::ops::Range;
 
@@ -62,28 +63,36 @@ fn enough(dataset: &Dataset, least: usize) -> Result<()> {
 fn divide(dataset: &Dataset, seed: u64, test: impl Fn(usize) -> Range<usize>) -> Split {
     let parts = dataset.objects.iter().map(|object| {
         let order = shuffled(object, seed);
-        let chosen = test(order.len());
-        let train = order[..chosen.start].iter().chain(&order[chosen.end..]).copied();
-        (object.select(train), object.select(order[chosen.clone()].iter().copied()))
+        let Range { start, end } = test(order.len());
+        (picked(object, order[..start].iter().chain(&order[end..])), picked(object, &order[start..end]))
     });
     let (train, test) = parts.unzip();
     let with = |objects| Dataset { objects, origin: dataset.origin.clone(), warnings: Vec::new() };
     Split { train: with(train), test: with(test) }
 }
 
-/// The positions of an object's touches: those of each source in a random order, spread evenly over the whole, so that any
-/// stretch has the same share of each source.
-fn shuffled(object: &ObjectTouches, seed: u64) -> Vec<usize> {
+/// The object with these touches, each with the number of its pool.
+fn picked<'t>(object: &ObjectTouches, touches: impl IntoIterator<Item = &'t (usize, Touch)>) -> ObjectTouches {
+    let mut pools = vec![Vec::new(); object.pools().len()];
+    touches.into_iter().for_each(|(pool, touch)| pools[*pool].push(*touch));
+    let mut pools = pools.into_iter();
+    object.each_pool(|_, _| pools.next().unwrap_or_default())
+}
+
+/// An object's touches, each with the number of its pool: those of each pool in a random order, spread evenly over the whole, so
+/// that any stretch has the same share of each pool.
+fn shuffled(object: &ObjectTouches, seed: u64) -> Vec<(usize, Touch)> {
     let mut order = Vec::with_capacity(object.len());
-    for (source, mut touches) in (0_u64..).zip(object.by_source()) {
-        touches.shuffle(&mut random::generator(seed, Purpose::Folds, &object.name, source));
+    for (number, pool) in object.pools().iter().enumerate() {
+        let mut touches = object.of_pool(pool).to_vec();
+        touches.shuffle(&mut random::generator(seed, Purpose::Folds, &object.name, number as u64));
         let all = touches.len() as u128;
-        let place = |(rank, touch): (usize, usize)| ((2 * rank as u128 + 1, all), source, touch);
+        let place = |(rank, touch): (usize, Touch)| ((2 * rank as u128 + 1, all), (number, touch));
         order.extend(touches.into_iter().enumerate().map(place));
     }
     // By (rank + ½) / number, as fractions.
-    order.sort_by(|(a, one, _), (b, other, _)| (a.0 * b.1).cmp(&(b.0 * a.1)).then(one.cmp(other)));
-    order.into_iter().map(|(.., touch)| touch).collect()
+    order.sort_by(|(a, (one, _)), (b, (other, _))| (a.0 * b.1).cmp(&(b.0 * a.1)).then(one.cmp(other)));
+    order.into_iter().map(|(_, touch)| touch).collect()
 }
 
 #[cfg(test)]
@@ -91,7 +100,6 @@ mod tests {
     use super::*;
     use crate::error::Kind;
     use crate::touches::{Origin, Source};
-    use palpate_shared::Touch;
 
     /// Objects whose touches are each identified by their own time.
     fn dataset(counts: &[u32]) -> Dataset {
@@ -155,30 +163,23 @@ mod tests {
         let names: Vec<String> = ["mug", "cup", "bowl"].map(String::from).into();
         let touches = |count: u32| (0..count).map(|i| Touch::from_micros([0, i, 9])).collect::<Vec<_>>();
         let vessel = ObjectTouches::in_turn("vessel", touches(300), &names, 0);
-        let runs = [("first", 200), ("second", 50)].map(|(log, count)| (Source::Log(log.into()), count));
-        let fork = ObjectTouches::in_runs("fork", touches(250), runs.into());
-        let all = Dataset::new(vec![fork, vessel]);
-        let time = |object: &ObjectTouches, touch: usize| object.touches()[touch].times()[1].micros().unwrap();
+        let logs = [("first", 0..200), ("second", 200..250)];
+        let logs = logs.map(|(log, times)| (Source::Log(log.into()), None, touches(250)[times].to_vec()));
+        let all = Dataset::new(vec![ObjectTouches::of_parts("fork", logs), vessel]);
         let parts = (0..5).flat_map(|index| {
             let Split { train, test } = fold(&all, index, 5, 1).unwrap();
             [(train, 4), (test, 1)]
         });
         let Split { train, test } = split(&all, 0.2, 1).unwrap();
         for (part, fifths) in parts.chain([(train, 4), (test, 1)]) {
-            let [fork, vessel] = &part.objects[..] else { panic!("{part:?}") };
-            for touch in 0..vessel.len() {
-                let name = names[time(vessel, touch) as usize % 3].clone();
-                assert_eq!(vessel.sources()[vessel.source_of(touch)], Source::Instance(name));
+            for (object, whole) in part.objects.iter().zip(&all.objects) {
+                for (pool, all_of) in object.pools().iter().zip(whole.pools()) {
+                    assert_eq!(pool.source, all_of.source);
+                    let [own, all] = [object.of_pool(pool), whole.of_pool(all_of)];
+                    assert!(own.iter().all(|touch| all.contains(touch)));
+                    assert!(own.len().abs_diff(all.len() * fifths / 5) <= 1, "{fifths} fifths");
+                }
             }
-            for touch in 0..fork.len() {
-                let log = if time(fork, touch) < 200 { "first" } else { "second" };
-                assert_eq!(fork.sources()[fork.source_of(touch)], Source::Log(log.into()));
-            }
-            let shares = |object: &ObjectTouches, all: &[usize]| {
-                let found = object.by_source();
-                found.iter().zip(all).all(|(touches, all)| touches.len().abs_diff(all * fifths / 5) <= 1)
-            };
-            assert!(shares(vessel, &[100; 3]) && shares(fork, &[200, 50]), "{fifths} fifths");
         }
     }
 

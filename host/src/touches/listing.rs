@@ -1,10 +1,9 @@
 //! `dataset.json`: the content and origin of a data set.
 
 use super::files::{EXTENSION, begin, check_name, refuse_bag};
-use super::{ObjectTouches, Origin, Recorded, Source};
+use super::{Origin, Recorded, Source};
 use crate::error::{Error, Place, Result, problem};
 use crate::output;
-use palpate_shared::Touch;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
@@ -19,9 +18,6 @@ pub struct Listing {
     pub origin: Origin,
     /// The objects, sorted by name.
     pub objects: Vec<Entry>,
-    /// The recordings that the touches are from, in their order; empty for simulated touches.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub recorded: Vec<Recorded>,
 }
 
 /// Entry of one object.
@@ -29,25 +25,10 @@ pub struct Listing {
 pub struct Entry {
     /// The object's name.
     pub name: String,
-    /// Number of touches on the disk.
-    pub touches: u64,
-    /// Number of approaches that they took.
+    /// Number of approaches that its touches took.
     pub approaches: u64,
-    /// The CRC-32 (ISO-HDLC, as in gzip and PNG) of the object's file.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub crc32: Option<u32>,
-    /// The names of its instances, if it has several: sample i is of instance i modulo their number, unless `counts` says
-    /// otherwise.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub instances: Vec<String>,
-    /// Number of touches of each instance, or of each placement, one after the other in the file, where they are not in turn, such
-    /// as after a split.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub counts: Vec<u64>,
-    /// The placements on a table that it was touched in, those of one instance after those of another: sample i is of number i
-    /// modulo their number, unless `counts` has a number of touches for each of them. Empty if it floats.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub placements: Vec<Lying>,
+    /// Its files, one for each pool of touches.
+    pub pools: Vec<PoolFile>,
     /// The [checksum](crate::mesh::Mesh::checksum) of each instance's mesh, as it was read, in hexadecimal digits.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub meshes: Vec<String>,
@@ -56,43 +37,93 @@ pub struct Entry {
     pub millimeters: Option<f64>,
 }
 
+/// File of the touches of an object that may be mixed in a sequence.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PoolFile {
+    /// The file's name without the extension, in a directory that is called like the object; none for the file beside
+    /// `dataset.json` that is called like the object.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
+    /// Number of touches in the file.
+    pub touches: u64,
+    /// The CRC-32 (ISO-HDLC, as in gzip and PNG) of the file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub crc32: Option<u32>,
+    /// The instance, if the object has several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub instance: Option<String>,
+    /// The placement on a table that the object was touched in; none if it floats.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub placement: Option<Lying>,
+    /// Number of the robot that made the touches, if robots differ.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub robot: Option<u32>,
+    /// The recording that the touches are from; none for simulated touches.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub recorded: Option<Recorded>,
+}
+
 /// A placement that an object was touched in.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Lying {
-    /// The instance, if the object has several.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub instance: Option<String>,
     /// The placement's name.
     pub name: String,
     /// Its weight among the placements of the object, or of the instance: from 0 to 1, with up to six decimals.
     pub weight: f64,
 }
 
-impl Lying {
-    /// The source of its touches.
-    pub(crate) fn source(&self) -> Source {
-        let millionths = (self.weight * 1e6).round().clamp(0.0, 1e6) as u32;
-        Source::Placement { instance: self.instance.clone(), placement: self.name.clone(), millionths }
+impl PoolFile {
+    /// The file of touches of a source, so far without touches.
+    pub(crate) fn of(source: &Source, robot: Option<u32>) -> Self {
+        let none = Self { robot, ..Self::default() };
+        match source.clone() {
+            Source::Object => none,
+            Source::Instance(instance) => Self { instance: Some(instance), ..none },
+            Source::Placement { instance, placement, millionths } => {
+                let placement = Some(Lying { name: placement, weight: f64::from(millionths) / 1e6 });
+                Self { instance, placement, ..none }
+            }
+            Source::Recording(recorded) => Self { recorded: Some(recorded), ..none },
+            Source::Log(path) => Self { instance: Some(path.display().to_string()), ..none },
+        }
     }
 
-    /// The placement that is a source of touches, if it is one.
-    pub(crate) fn of(source: &Source) -> Option<Self> {
-        match source {
-            Source::Placement { instance, placement, millionths } => {
-                Some(Self { instance: instance.clone(), name: placement.clone(), weight: f64::from(*millionths) / 1e6 })
+    /// The source of the touches.
+    pub(crate) fn source(&self) -> Source {
+        match (&self.recorded, &self.placement, &self.instance) {
+            (Some(recorded), ..) => Source::Recording(recorded.clone()),
+            (_, Some(Lying { name, weight }), instance) => {
+                let millionths = (weight * 1e6).round().clamp(0.0, 1e6) as u32;
+                Source::Placement { instance: instance.clone(), placement: name.clone(), millionths }
             }
-            _ => None,
+            (.., Some(instance)) => Source::Instance(instance.clone()),
+            _ => Source::Object,
         }
     }
 }
 
 impl Entry {
-    /// Sources of its touches in turn: placements, instances, or none.
-    pub(crate) fn sources(&self) -> Vec<Source> {
-        match self.placements.is_empty() {
-            true => self.instances.iter().cloned().map(Source::Instance).collect(),
-            false => self.placements.iter().map(Lying::source).collect(),
+    /// The entry of an object with a file for each source and robot, so far without touches.
+    pub(crate) fn of<'s>(name: &str, pools: impl IntoIterator<Item = (&'s Source, Option<u32>)>) -> Self {
+        let mut pools: Vec<PoolFile> = pools.into_iter().map(|(source, robot)| PoolFile::of(source, robot)).collect();
+        if pools.len() > 1 {
+            (1..).zip(&mut pools).for_each(|(number, pool)| pool.file = Some(number.to_string()));
+        }
+        Self { name: name.into(), pools, ..Self::default() }
+    }
+
+    /// Number of touches on the disk.
+    pub fn touches(&self) -> u64 {
+        self.pools.iter().map(|pool| pool.touches).sum()
+    }
+
+    /// The path of a pool's file in the directory of the data set.
+    pub fn path(&self, directory: &Path, pool: &PoolFile) -> PathBuf {
+        match &pool.file {
+            Some(file) => directory.join(&self.name).join(format!("{file}.{EXTENSION}")),
+            None => directory.join(format!("{}.{EXTENSION}", self.name)),
         }
     }
 }
@@ -106,15 +137,14 @@ impl Listing {
         Self {
             palpate: env!("CARGO_PKG_VERSION").into(),
             origin: origin.clone(),
-            objects: names.into_iter().map(|name| Entry { name, ..Entry::default() }).collect(),
-            recorded: Vec::new(),
+            objects: names.into_iter().map(|name| Entry::of(&name, [(&Source::Object, None)])).collect(),
         }
     }
 
     /// True if a real probe made the touches. Such a data set may grow at any time: what its files hold beyond what is
     /// listed counts, up to the last whole line.
     pub(crate) fn is_recorded(&self) -> bool {
-        !self.recorded.is_empty()
+        self.objects.iter().flat_map(|entry| &entry.pools).any(|pool| pool.recorded.is_some())
     }
 
     /// Path of a directory's listing.
@@ -147,11 +177,24 @@ impl Listing {
             .map_err(|error| not_a_listing(&error).at(Place::line(path, error.line() as u64)))?;
         let mut names: Vec<&str> = listing.objects.iter().map(|entry| entry.name.as_str()).collect();
         names.sort_unstable();
-        names.iter().try_for_each(|name| check_name(name)).map_err(|error| error.at(Place::file(path)))?;
+        let files = listing.objects.iter().flat_map(|entry| &entry.pools).filter_map(|pool| pool.file.as_deref());
+        let all = names.iter().copied().chain(files);
+        all.map(check_name).collect::<Result<Vec<_>>>().map_err(|error| error.at(Place::file(path)))?;
         if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
             return Err(problem!("the object {} is listed twice", pair[0]).fix(FROM_ELSEWHERE).at(Place::file(path)));
         }
+        let mut paths: Vec<PathBuf> = listing.paths(Path::new("")).collect();
+        paths.sort_unstable();
+        if let Some(pair) = paths.windows(2).find(|pair| pair[0] == pair[1]) {
+            let twice = problem!("the file {} is listed twice", pair[0].display());
+            return Err(twice.fix(FROM_ELSEWHERE).at(Place::file(path)));
+        }
         Ok(listing)
+    }
+
+    /// The paths of all files of touches in the directory.
+    pub(crate) fn paths(&self, directory: &Path) -> impl Iterator<Item = PathBuf> {
+        self.objects.iter().flat_map(move |entry| entry.pools.iter().map(move |pool| entry.path(directory, pool)))
     }
 
     /// Writes the listing, whole or not at all, over an existing one.
@@ -162,49 +205,9 @@ impl Listing {
         output::write_json(&Self::path(directory), self)
     }
 
-    /// The touches of a listed object, and what each of them is of.
-    pub(super) fn with_sources(&self, entry: &Entry, touches: Vec<Touch>) -> Result<ObjectTouches> {
-        let (name, origin) = (entry.name.clone(), &self.origin);
-        if self.is_recorded() {
-            let recorded = self.recorded.iter().filter(|recorded| recorded.object == name).cloned();
-            let mut runs: Vec<_> = recorded.map(|one| (one.touches, Source::Recording(one))).collect();
-            if runs.is_empty() {
-                // A real probe made the touches, and nothing says when.
-                let count = touches.len() as u64;
-                let one = Recorded { object: name.clone(), touches: count, ..Recorded::default() };
-                runs.push((count, Source::Recording(one)));
-            }
-            let runs = runs.into_iter().map(|(count, source)| (source, count)).collect();
-            return Ok(ObjectTouches::in_runs(name, touches, runs).of_origin(origin));
-        }
-        if entry.counts.is_empty() {
-            let first = origin.samples().start;
-            return Ok(ObjectTouches::in_turn(name, touches, &entry.sources(), first).of_origin(origin));
-        }
-        let stated = entry.counts.iter().try_fold(0_u64, |sum, &count| sum.checked_add(count));
-        let sources = entry.sources();
-        if entry.counts.len() != sources.len() || stated != Some(touches.len() as u64) {
-            return Err(not_a_listing(format_args!(
-                "{name} has {} {} and {} touches, and counts that are not for these",
-                sources.len(),
-                if entry.placements.is_empty() { "instances" } else { "placements" },
-                touches.len()
-            )));
-        }
-        let runs = sources.into_iter().zip(entry.counts.iter().copied()).collect();
-        Ok(ObjectTouches::in_runs(name, touches, runs).of_origin(origin))
-    }
-
     /// The objects' names.
     pub(crate) fn names(&self) -> Vec<String> {
         self.objects.iter().map(|entry| entry.name.clone()).collect()
-    }
-}
-
-impl Entry {
-    /// The object's file of touches in a directory.
-    pub fn file(&self, directory: &Path) -> PathBuf {
-        directory.join(format!("{}.{EXTENSION}", self.name))
     }
 }
 
@@ -231,7 +234,7 @@ mod tests {
     "approaches": false
   },
   "objects": [
-    {"name": "fork", "touches": 2, "approaches": 31}
+    {"name": "fork", "approaches": 31, "pools": [{"touches": 2}]}
   ]
 }"#;
 
@@ -240,7 +243,7 @@ mod tests {
         let listing = Listing::parse(PLAIN.as_bytes(), Path::new("dataset.json")).unwrap();
         assert_eq!(listing.origin.probe.spacing, 2.0);
         assert_eq!(listing.names(), ["fork"]);
-        assert_eq!(listing.objects[0].crc32, None);
+        assert_eq!(listing.objects[0].pools[0].crc32, None);
     }
 
     #[test]
@@ -248,7 +251,7 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         assert_eq!(Listing::read(directory.path()).unwrap(), None);
         let mut listing = Listing::new(&Origin::default(), ["fork".into(), "spoon".into()]);
-        listing.objects[0].crc32 = Some(u32::MAX);
+        listing.objects[0].pools[0].crc32 = Some(u32::MAX);
         listing.write(directory.path()).unwrap();
         assert_eq!(Listing::read(directory.path()).unwrap(), Some(listing));
     }
@@ -263,8 +266,23 @@ mod tests {
     }
 
     #[test]
+    fn a_listing_that_names_a_file_twice_or_outside_of_the_objects_directory_is_refused() {
+        let refused = |pools: &str| {
+            let text = PLAIN.replace(r#"[{"touches": 2}]"#, pools);
+            Listing::parse(text.as_bytes(), Path::new("dataset.json")).unwrap_err().to_string()
+        };
+        for pools in
+            [r#"[{"touches": 2}, {"touches": 3}]"#, r#"[{"file": "1", "touches": 2}, {"file": "1", "touches": 1}]"#]
+        {
+            assert!(refused(pools).contains("is listed twice"), "{}", refused(pools));
+        }
+        let outside = refused(r#"[{"file": "../fork", "touches": 2}]"#);
+        assert!(outside.contains("no file can be named after"), "{outside}");
+    }
+
+    #[test]
     fn a_listing_that_names_an_object_twice_is_refused() {
-        let entry = "{\"name\": \"fork\", \"touches\": 2, \"approaches\": 31}";
+        let entry = r#"{"name": "fork", "approaches": 31, "pools": [{"touches": 2}]}"#;
         let text = PLAIN.replace(entry, &format!("{entry}, {entry}"));
         let error = Listing::parse(text.as_bytes(), Path::new("dataset.json")).unwrap_err().to_string();
         assert!(error.contains("dataset.json: the object fork is listed twice"), "{error}");

@@ -1,8 +1,10 @@
 //! Touches in memory and on disk.
 //!
-//! A data set is a directory with one file per object: `<object>.txt`, one line per touch ([`text`]). A directory that [`capture`](crate::capture) wrote also holds `dataset.json`, its
-//! [`Listing`]: which objects there are, how many touches of each, their files' checksums, and how the touches were made
-//! ([`Origin`]). A directory without a listing is a data set too, and states nothing about its probe; it
+//! A data set is a directory, and each file in it is a [`Pool`]: touches of one object that may be mixed in a sequence, one line
+//! per touch ([`text`]). An object has the file `<object>.txt` or, if it has several instances, placements or recordings, the
+//! files `<object>/1.txt`, `<object>/2.txt` and so on. A directory that [`capture`](crate::capture) wrote also holds
+//! `dataset.json`, its [`Listing`]: which objects and files there are, what each file is of, how many touches it has, its
+//! checksum, and how the touches were made ([`Origin`]). A directory without a listing is a data set too, and states nothing about its probe; it
 //! may also hold logs of robots (`<object>.mcap`, or of any objects that their messages name), and a log is a data set by
 //! itself ([`Log`]).
 //!
@@ -62,10 +64,10 @@ pub use dataset::Dataset;
 pub(crate) use files::files;
 pub use files::{begins_log, is_log};
 pub use finding::Finding;
-pub use listing::{Entry, Listing, Lying};
+pub use listing::{Entry, Listing, Lying, PoolFile};
 pub use log::{Log, Logged, read_touches};
 pub use logged::{Channels, Message};
-pub use object::{ObjectTouches, Pool, Source};
+pub use object::{ObjectTouches, Part, Pool, Source};
 pub use origin::Origin;
 pub use recorded::Recorded;
 pub use recording::Recording;

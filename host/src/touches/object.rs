@@ -5,6 +5,7 @@ use crate::error::Result;
 use crate::probe::hand;
 use crate::probe::noise::{Noise, Stream};
 use palpate_shared::Touch;
+use std::ops::Range;
 use std::path::PathBuf;
 
 /// Origin that touches of an object share if they may follow each other in a sequence. Touches of two sources never do:
@@ -48,38 +49,56 @@ impl From<String> for Source {
     }
 }
 
-/// The touches of one object. Each keeps the source that it is of, and the robot that made it, through everything that is
-/// done with them: there is no way to make such touches without stating their object.
+/// Touches of one object, in pools. There is no way to make such touches without stating their object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObjectTouches {
     /// The object's name.
     pub name: String,
     touches: Vec<Touch>,
-    /// Each has a touch.
-    sources: Vec<Source>,
-    /// For each touch the position of its source; empty if there is one source.
-    source_of: Vec<u32>,
-    /// For each touch the number of the robot that made it; empty if robots do not differ.
-    robot_of: Vec<u32>,
+    /// One after the other. Each has a touch, and no two are of the same source and robot.
+    pools: Vec<Pool>,
     /// The stroke of the probe that made them as a time in microseconds: also with noise that is added, a later contact is
     /// missing.
     window: Option<u32>,
 }
 
-/// Touches of an object that may be mixed in a sequence: those of one source that one robot made.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// Touches that may be mixed in a sequence: those of one source that one robot made.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Pool {
-    /// The position of the source among [`ObjectTouches::sources`].
-    pub source: usize,
-    /// The positions of the touches, ascending.
-    pub touches: Vec<u32>,
+    /// Source of the touches.
+    pub source: Source,
+    /// Number of the robot that made them; none if robots do not differ.
+    pub robot: Option<u32>,
+    /// Their positions among the object's touches, in the order of their file.
+    pub range: Range<usize>,
 }
+
+/// Touches of a source and of a robot, where robots differ, that are not among those of an object yet.
+pub type Part = (Source, Option<u32>, Vec<Touch>);
 
 impl ObjectTouches {
     /// Touches that are all of one source.
     pub fn new(name: impl Into<String>, touches: Vec<Touch>, source: Source) -> Self {
-        let sources = if touches.is_empty() { Vec::new() } else { vec![source] };
-        Self { name: name.into(), touches, sources, source_of: Vec::new(), robot_of: Vec::new(), window: None }
+        Self::of_parts(name, [(source, None, touches)])
+    }
+
+    /// Touches in parts; those of the same source and robot become one pool.
+    pub fn of_parts(name: impl Into<String>, parts: impl IntoIterator<Item = Part>) -> Self {
+        let mut joined: Vec<Part> = Vec::new();
+        for (source, robot, touches) in parts {
+            match joined.iter_mut().find(|other| (&other.0, other.1) == (&source, robot)) {
+                Some((.., there)) => there.extend(touches),
+                None if touches.is_empty() => {}
+                None => joined.push((source, robot, touches)),
+            }
+        }
+        let mut object = Self { name: name.into(), touches: Vec::new(), pools: Vec::new(), window: None };
+        for (source, robot, touches) in joined {
+            let begin = object.len();
+            object.touches.extend(touches);
+            object.pools.push(Pool { source, robot, range: begin..object.len() });
+        }
+        object
     }
 
     /// Touches of instances or placements in turn: touch i is of number `first` + i modulo their number. Without any, and of one
@@ -91,125 +110,51 @@ impl ObjectTouches {
         first: u64,
     ) -> Self {
         let sources: Vec<Source> = sources.iter().cloned().map(Into::into).collect();
-        let count = sources.len() as u64;
-        match &sources[..] {
-            [] | [Source::Instance(_)] => return Self::new(name, touches, Source::Object),
-            [one] => return Self::new(name, touches, one.clone()),
-            _ => {}
+        let sources = match &sources[..] {
+            [] | [Source::Instance(_)] => vec![Source::Object],
+            _ => sources,
+        };
+        let mut parts: Vec<Part> = sources.into_iter().map(|source| (source, None, Vec::new())).collect();
+        let count = parts.len();
+        // Below the number of the sources.
+        let first = (first % count as u64) as usize;
+        for (number, touch) in touches.into_iter().enumerate() {
+            parts[(first + number) % count].2.push(touch);
         }
-        // Below the number of the instances.
-        let source_of = (0..touches.len() as u64).map(|touch| ((first % count + touch) % count) as u32).collect();
-        Self { name: name.into(), touches, sources, source_of, robot_of: Vec::new(), window: None }.tidied()
-    }
-
-    /// Touches in any order, each with the number of its instance.
-    pub fn numbered(name: impl Into<String>, touches: &[(Touch, i64)]) -> Self {
-        let mut numbers: Vec<i64> = touches.iter().map(|(_, number)| *number).collect();
-        numbers.sort_unstable();
-        numbers.dedup();
-        let all = touches.iter().map(|(touch, _)| *touch).collect();
-        if numbers.len() <= 1 {
-            return Self::new(name, all, Source::Object);
-        }
-        // Below the number of touches, which are counted in 32 bits.
-        let place = |(_, number): &(Touch, i64)| numbers.partition_point(|other| other < number) as u32;
-        let source_of = touches.iter().map(place).collect();
-        let sources = numbers.iter().map(|number| Source::Instance(number.to_string())).collect();
-        Self { name: name.into(), touches: all, sources, source_of, robot_of: Vec::new(), window: None }
-    }
-
-    /// Touches of one source after the other: of each as many as are stated, of the last one all the rest.
-    pub(crate) fn in_runs(name: impl Into<String>, touches: Vec<Touch>, runs: Vec<(Source, u64)>) -> Self {
-        let last = runs.len().saturating_sub(1);
-        let mut source_of = Vec::new();
-        for (position, (_, count)) in (0_u32..).zip(&runs) {
-            let left = touches.len() - source_of.len();
-            let count =
-                if position as usize == last { left } else { usize::try_from(*count).unwrap_or(left).min(left) };
-            source_of.extend(std::iter::repeat_n(position, count));
-        }
-        let mut sources: Vec<Source> = runs.into_iter().map(|(source, _)| source).collect();
-        if sources.is_empty() {
-            sources.push(Source::Object);
-            source_of = vec![0; touches.len()];
-        }
-        Self { name: name.into(), touches, sources, source_of, robot_of: Vec::new(), window: None }.tidied()
+        Self::of_parts(name, parts)
     }
 
     /// The touches of several objects, one after the other, as those of one whose sources are all of theirs.
     pub fn joined(name: impl Into<String>, objects: &[Self]) -> Self {
-        let mut joined = Self::new(name, Vec::new(), Source::Object);
-        for object in objects {
-            let named = |source: &Source| match source {
-                Source::Object => Source::Instance(object.name.clone()),
-                Source::Instance(instance) => Source::Instance(format!("{}/{instance}", object.name)),
-                Source::Placement { instance, placement, millionths } => Source::Placement {
-                    instance: Some(match instance {
-                        Some(instance) => format!("{}/{instance}", object.name),
-                        None => object.name.clone(),
-                    }),
-                    placement: placement.clone(),
-                    millionths: *millionths,
-                },
-                other => other.clone(),
-            };
-            let sources = object.sources.iter().map(named).collect();
-            joined.extend(&Self { sources, ..object.clone() }, false);
-        }
-        joined
-    }
-
-    /// Adds more touches of the same object: those of equal sources are of one.
-    pub(crate) fn append(&mut self, more: &Self) {
-        self.extend(more, true);
-    }
-
-    fn extend(&mut self, more: &Self, may_share: bool) {
-        if self.is_empty() {
-            self.window = more.window;
-        }
-        let (before, robots) = (self.touches.len(), self.robot_of.len() + more.robot_of.len());
-        if self.source_of.is_empty() {
-            self.source_of = vec![0; before];
-        }
-        if robots > 0 {
-            self.robot_of.resize(before, 0);
-            self.robot_of.extend((0..more.touches.len()).map(|touch| more.robot_of.get(touch).copied().unwrap_or(0)));
-        }
-        let place = |source: &Source| {
-            let there = self.sources.iter().position(|own| own == source).filter(|_| may_share);
-            there.unwrap_or_else(|| {
-                self.sources.push(source.clone());
-                self.sources.len() - 1
-            })
+        let named = |object: &Self, source: &Source| match source {
+            Source::Object => Source::Instance(object.name.clone()),
+            Source::Instance(instance) => Source::Instance(format!("{}/{instance}", object.name)),
+            Source::Placement { instance, placement, millionths } => Source::Placement {
+                instance: Some(match instance {
+                    Some(instance) => format!("{}/{instance}", object.name),
+                    None => object.name.clone(),
+                }),
+                placement: placement.clone(),
+                millionths: *millionths,
+            },
+            other => other.clone(),
         };
-        // Sources are counted in 32 bits, as touches are.
-        let places: Vec<u32> = more.sources.iter().map(place).map(|place| place as u32).collect();
-        self.source_of.extend((0..more.touches.len()).map(|touch| places[more.source_of(touch)]));
-        self.touches.extend_from_slice(&more.touches);
-        *self = std::mem::replace(self, Self::new("", Vec::new(), Source::Object)).tidied();
+        let parts = objects
+            .iter()
+            .flat_map(|object| object.parts().map(|(source, robot, touches)| (named(object, &source), robot, touches)));
+        let window = objects.first().and_then(|object| object.window);
+        Self::of_parts(name, parts).of_stroke(window)
     }
 
-    /// Without sources that have no touch; what says nothing is left out.
-    fn tidied(mut self) -> Self {
-        let mut has_touch = vec![false; self.sources.len()];
-        if self.source_of.is_empty() {
-            has_touch.iter_mut().take(usize::from(!self.touches.is_empty())).for_each(|has| *has = true);
-        }
-        self.source_of.iter().for_each(|&source| has_touch[source as usize] = true);
-        let mut place = Vec::with_capacity(has_touch.len());
-        let mut next = 0_u32;
-        for &has in &has_touch {
-            place.push(next);
-            next += u32::from(has);
-        }
-        let mut has = has_touch.iter();
-        self.sources.retain(|_| has.next().is_some_and(|has| *has));
-        self.source_of.iter_mut().for_each(|source| *source = place[*source as usize]);
-        if self.sources.len() <= 1 {
-            self.source_of.clear();
-        }
-        self
+    /// Adds touches of the same object: those of equal sources and robots are of one pool.
+    pub(crate) fn append(&mut self, more: &Self) {
+        let window = if self.is_empty() { more.window } else { self.window };
+        *self = Self::of_parts(&self.name, self.parts().chain(more.parts())).of_stroke(window);
+    }
+
+    /// The pools as parts of another object.
+    fn parts(&self) -> impl Iterator<Item = Part> {
+        self.pools.iter().map(|pool| (pool.source.clone(), pool.robot, self.of_pool(pool).to_vec()))
     }
 
     /// These touches as of a probe with this stroke, a time in microseconds ([`Probe::window`](crate::probe::Probe::window)).
@@ -237,9 +182,19 @@ impl ObjectTouches {
         touches
     }
 
-    /// The touches, in the order of the file.
+    /// The touches, pool after pool.
     pub fn touches(&self) -> &[Touch] {
         &self.touches
+    }
+
+    /// Pools of the touches. A sequence is of one pool.
+    pub fn pools(&self) -> &[Pool] {
+        &self.pools
+    }
+
+    /// The touches of a pool; none of a pool of another object.
+    pub fn of_pool(&self, pool: &Pool) -> &[Touch] {
+        self.touches.get(pool.range.clone()).unwrap_or_default()
     }
 
     /// Refuses the touches if many of them take longer than `longest`, as files of touches are refused.
@@ -262,39 +217,35 @@ impl ObjectTouches {
         self.touches.is_empty()
     }
 
-    /// Sources of the touches; each has at least one.
-    pub fn sources(&self) -> &[Source] {
-        &self.sources
+    /// Sources of the touches, each once; those of different robots are the same.
+    pub fn sources(&self) -> Vec<&Source> {
+        let mut sources = Vec::with_capacity(self.pools.len());
+        for pool in &self.pools {
+            if !sources.contains(&&pool.source) {
+                sources.push(&pool.source);
+            }
+        }
+        sources
     }
 
-    /// The position of a touch's source among [`sources`](Self::sources).
-    pub fn source_of(&self, touch: usize) -> usize {
-        self.source_of.get(touch).map_or(0, |source| *source as usize)
-    }
-
-    /// The placement of a source among [`sources`](Self::sources), by name; none if it is of none, or a recording that states
-    /// none.
-    pub(crate) fn placement_of_source(&self, source: usize) -> Option<&str> {
-        self.sources.get(source)?.placement()
-    }
-
-    /// The share that each source has of the object: of placements their weights, each instance counting the same; equal shares
-    /// of the placements that recordings state, and of other sources. They sum to 1.
+    /// The share that each of the [sources](Self::sources) has of the object: of placements their weights, each instance counting
+    /// the same; equal shares of the placements that recordings state, and of other sources. They sum to 1.
     pub(crate) fn source_weights(&self) -> Vec<f64> {
-        let like = |source: &Source| self.sources.iter().filter(|own| own.placement() == source.placement()).count();
-        let weight = |source: &Source| match source {
+        let sources = self.sources();
+        let like = |source: &Source| sources.iter().filter(|own| own.placement() == source.placement()).count();
+        let weight = |source: &&Source| match source {
             Source::Placement { millionths, .. } => f64::from(*millionths),
             // How often it was recorded says nothing of how often it lies like that.
             Source::Recording(Recorded { placement: Some(_), .. }) => 1e6 / like(source).max(1) as f64,
             _ => 1e6,
         };
-        let weights: Vec<f64> = self.sources.iter().map(weight).collect();
+        let weights: Vec<f64> = sources.iter().map(weight).collect();
         let whole: f64 = weights.iter().sum();
         // Every placement has a weight, unless a file was changed by hand.
         if whole > 0.0 {
             weights.into_iter().map(|weight| weight / whole).collect()
         } else {
-            vec![1.0 / self.sources.len().max(1) as f64; self.sources.len()]
+            vec![1.0 / sources.len().max(1) as f64; sources.len()]
         }
     }
 
@@ -302,8 +253,8 @@ impl ObjectTouches {
     /// sum to 1. None if the object was not touched in placements, or a recording states none.
     pub(crate) fn placement_weights(&self) -> Option<Vec<(String, f64)>> {
         let mut sums = std::collections::BTreeMap::<&str, f64>::new();
-        for (source, weight) in self.source_weights().into_iter().enumerate() {
-            *sums.entry(self.placement_of_source(source)?).or_default() += weight;
+        for (source, weight) in self.sources().into_iter().zip(self.source_weights()) {
+            *sums.entry(source.placement()?).or_default() += weight;
         }
         let mut weights: Vec<_> = sums.into_iter().map(|(name, weight)| (name.to_owned(), weight)).collect();
         weights.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -315,20 +266,15 @@ impl ObjectTouches {
     pub(crate) fn by_placement(&self) -> Vec<Self> {
         let Some(mut weights) = self.placement_weights() else { return vec![self.clone()] };
         weights.sort_by(|a, b| a.0.cmp(&b.0));
+        let without = |source: &Source| match source.clone() {
+            Source::Placement { instance, .. } => instance.map_or(Source::Object, Source::Instance),
+            Source::Recording(recorded) => Source::Recording(Recorded { placement: None, ..recorded }),
+            other => other,
+        };
         let of = |(placement, _): (String, f64)| {
-            let is_own = |touch: &usize| self.placement_of_source(self.source_of(*touch)) == Some(&placement);
-            let mut own = self.select((0..self.len()).filter(is_own));
-            own.name = format!("{}/{placement}", self.name);
-            for source in &mut own.sources {
-                match source {
-                    Source::Placement { instance, .. } => {
-                        *source = instance.take().map_or(Source::Object, Source::Instance);
-                    }
-                    Source::Recording(recorded) => recorded.placement = None,
-                    _ => {}
-                }
-            }
-            own
+            let own = self.parts().filter(|(source, ..)| source.placement() == Some(&placement));
+            let own = own.map(|(source, robot, touches)| (without(&source), robot, touches));
+            Self::of_parts(format!("{}/{placement}", self.name), own).of_stroke(self.window)
         };
         weights.into_iter().map(of).collect()
     }
@@ -338,68 +284,40 @@ impl ObjectTouches {
     #[must_use]
     #[cfg(any(feature = "train", test))]
     pub(crate) fn as_often_as_placed(&self) -> Self {
-        let is_recorded = self.sources.iter().any(|source| matches!(source, Source::Recording(_)));
+        let is_recorded = self.pools.iter().any(|pool| matches!(pool.source, Source::Recording(_)));
         if is_recorded || self.placement_weights().is_none() {
             return self.clone();
         }
-        let (by_source, weights) = (self.by_source(), self.source_weights());
-        let most = by_source.iter().zip(&weights).map(|(touches, weight)| touches.len() as f64 / weight);
-        let all = most.fold(f64::INFINITY, f64::min);
-        let kept = by_source.iter().zip(&weights).flat_map(|(touches, weight)| {
-            let count = (all * weight).round() as usize;
-            touches.iter().copied().take(count.max(1))
-        });
-        let mut kept: Vec<usize> = kept.collect();
-        kept.sort_unstable();
-        self.select(kept)
-    }
-
-    /// For each source its touches' positions, ascending.
-    pub(crate) fn by_source(&self) -> Vec<Vec<usize>> {
-        let mut by_source = vec![Vec::new(); self.sources.len()];
-        (0..self.len()).for_each(|touch| by_source[self.source_of(touch)].push(touch));
-        by_source
-    }
-
-    /// Pools of touches that may be mixed in a sequence: one pool for each source and robot, those of different sources
-    /// in turn. An object without touches has one empty pool.
-    pub fn pools(&self) -> Vec<Pool> {
-        let mut by_source: Vec<Vec<(u32, Pool)>> = vec![Vec::new(); self.sources.len().max(1)];
-        let mut places = std::collections::HashMap::new();
-        for touch in 0..self.len() {
-            let (source, robot) = (self.source_of(touch), self.robot_of.get(touch).copied().unwrap_or(0));
-            let pools = &mut by_source[source];
-            let place = *places.entry((source, robot)).or_insert_with(|| {
-                pools.push((robot, Pool { source, touches: Vec::new() }));
-                pools.len() - 1
-            });
-            // A position is below the number of a file's lines.
-            pools[place].1.touches.extend(u32::try_from(touch));
-        }
-        let most = by_source.iter().map(Vec::len).max().unwrap_or(0);
-        let mut by_source: Vec<_> = by_source.into_iter().map(Vec::into_iter).collect();
-        let mut pools = Vec::new();
-        for _ in 0..most {
-            pools.extend(by_source.iter_mut().filter_map(Iterator::next).map(|(_, pool)| pool));
-        }
-        if pools.is_empty() { vec![Pool { source: 0, touches: Vec::new() }] } else { pools }
+        let sources = self.sources();
+        let weights = self.source_weights();
+        let weight = |pool: &Pool| {
+            let place = sources.iter().position(|source| **source == pool.source).unwrap_or_default();
+            let robots = self.pools.iter().filter(|other| other.source == pool.source).count();
+            weights[place] / robots as f64
+        };
+        let least = self.pools.iter().map(|pool| pool.range.len() as f64 / weight(pool));
+        let all = least.fold(f64::INFINITY, f64::min);
+        self.each_pool(|pool, touches| {
+            let count = (all * weight(pool)).round() as usize;
+            touches.iter().copied().take(count.max(1)).collect()
+        })
     }
 
     /// These touches, each made by the robot with this number.
     #[must_use]
-    pub fn of_robots(self, mut robots: Vec<u32>) -> Self {
-        robots.resize(self.len(), 0);
-        Self { robot_of: robots, ..self }
-    }
-
-    /// The number of the robot that made a touch; none if robots do not differ.
-    pub fn robot_of(&self, touch: usize) -> Option<u32> {
-        self.robot_of.get(touch).copied()
+    pub fn of_robots(&self, robots: &[u32]) -> Self {
+        let robot = |position: usize| Some(robots.get(position).copied().unwrap_or(0));
+        let of = |pool: &'_ Pool| {
+            let source = pool.source.clone();
+            let touches = pool.range.clone().zip(self.of_pool(pool));
+            touches.map(move |(position, touch)| (source.clone(), robot(position), vec![*touch])).collect::<Vec<_>>()
+        };
+        Self::of_parts(&self.name, self.pools.iter().flat_map(of)).of_stroke(self.window)
     }
 
     /// True if every sequence must be of one robot's touches, since robots differ.
     pub(crate) fn has_robots(&self) -> bool {
-        !self.robot_of.is_empty()
+        self.pools.iter().any(|pool| pool.robot.is_some())
     }
 
     /// These touches under another name.
@@ -409,38 +327,36 @@ impl ObjectTouches {
         Self { name: name.into(), ..self }
     }
 
-    /// The touches at these positions, in this order. Positions out of range give none.
+    /// Other touches in each pool, in their order; a pool without any is left out.
     #[must_use]
-    pub fn select(&self, positions: impl IntoIterator<Item = usize>) -> Self {
-        let positions: Vec<usize> = positions.into_iter().filter(|position| *position < self.len()).collect();
-        let of = |all: &[u32]| positions.iter().filter_map(|&position| all.get(position).copied()).collect();
-        let some = Self {
-            name: self.name.clone(),
-            touches: positions.iter().map(|&position| self.touches[position]).collect(),
-            sources: self.sources.clone(),
-            source_of: of(&self.source_of),
-            robot_of: of(&self.robot_of),
-            window: self.window,
-        };
-        some.tidied()
+    pub fn each_pool(&self, mut touches: impl FnMut(&Pool, &[Touch]) -> Vec<Touch>) -> Self {
+        let parts = self.pools.iter().map(|pool| (pool.source.clone(), pool.robot, touches(pool, self.of_pool(pool))));
+        Self::of_parts(&self.name, parts.collect::<Vec<_>>()).of_stroke(self.window)
+    }
+
+    /// The touches of each pool from one share of it on up to another.
+    #[must_use]
+    pub fn part(&self, from: f64, to: f64) -> Self {
+        self.each_pool(|_, touches| {
+            // Rounded to the nearest touch; `as` saturates.
+            let at = |share: f64| ((touches.len() as f64 * share).round() as usize).min(touches.len());
+            touches[at(from)..at(to).max(at(from))].to_vec()
+        })
     }
 
     /// The touches that `keep` says.
     #[must_use]
     #[cfg(test)]
     pub(crate) fn filtered(&self, keep: impl Fn(&Touch) -> bool) -> Self {
-        self.select((0..self.len()).filter(|&touch| keep(&self.touches[touch])))
+        self.each_pool(|_, touches| touches.iter().copied().filter(&keep).collect())
     }
 
-    /// Up to `count` of the touches, spread over all of them within each source, in their order.
+    /// Up to `count` of the touches, spread over each pool, in their order.
     #[must_use]
     #[cfg(any(feature = "train", test))]
     pub(crate) fn thinned(&self, count: usize) -> Self {
         let step = self.len().div_ceil(count.max(1)).max(1);
-        let mut chosen: Vec<usize> =
-            self.by_source().into_iter().flat_map(|touches| touches.into_iter().step_by(step)).collect();
-        chosen.sort_unstable();
-        self.select(chosen)
+        self.each_pool(|_, touches| touches.iter().copied().step_by(step).collect())
     }
 
     /// These touches, each changed.
@@ -453,22 +369,21 @@ impl ObjectTouches {
     /// their number does not matter; touches that robots made stay those robots'.
     #[must_use]
     pub(crate) fn noisy(&self, noise: &Noise, seed: u64, robots: usize) -> Self {
-        let mut robot_of = self.robot_of.clone();
-        if robot_of.is_empty() && noise.has_bias() && robots > 1 {
-            let sources = self.sources.len();
-            let mut ranks = vec![0; sources];
-            // Below the number of robots.
-            robot_of.extend((0..self.len()).map(|touch| {
-                let source = self.source_of(touch);
-                let robot = (ranks[source] * sources + source) % robots;
-                ranks[source] += 1;
-                robot as u32
-            }));
-        }
         let stream = self.stream(noise, seed);
-        let robot = |touch: usize| robot_of.get(touch).copied().unwrap_or(0).into();
-        let noisy = self.touches.iter().enumerate().map(|(index, touch)| stream.add(touch, index, robot(index)));
-        Self { touches: self.within_stroke(noisy.collect()), robot_of, ..self.clone() }
+        let divides = noise.has_bias() && robots > 1 && !self.has_robots();
+        let (sources, parts) = (self.pools.len(), if divides { robots } else { 1 });
+        let mut noisy = Vec::with_capacity(sources * parts);
+        // One pool of each source in turn, so that those that come first are of all sources.
+        for turn in 0..parts {
+            for (source, pool) in self.pools.iter().enumerate() {
+                // Below the number of robots.
+                let robot = if divides { Some(((turn * sources + source) % robots) as u32) } else { pool.robot };
+                let touches = pool.range.clone().skip(turn).step_by(parts);
+                let touches = touches.map(|touch| stream.add(&self.touches[touch], touch, robot.unwrap_or(0).into()));
+                noisy.push((pool.source.clone(), robot, self.within_stroke(touches.collect())));
+            }
+        }
+        Self::of_parts(&self.name, noisy).of_stroke(self.window)
     }
 }
 
@@ -487,25 +402,31 @@ mod tests {
     use super::*;
     use crate::with;
 
-    fn touches(count: u32) -> Vec<Touch> {
-        (0..count).map(|touch| Touch::from_micros([0, touch, 9])).collect()
+    fn touches(range: Range<u32>) -> Vec<Touch> {
+        range.map(|touch| Touch::from_micros([0, touch, 9])).collect()
     }
 
     fn names(count: usize) -> Vec<String> {
         (0..count).map(|instance| format!("cup {instance}")).collect()
     }
 
-    /// The times by which touches are known, for each source.
+    /// The times by which touches are known, for each pool.
     fn times(object: &ObjectTouches) -> Vec<(Source, Vec<u32>)> {
-        let time = |touch: usize| object.touches()[touch].times()[1].micros().unwrap();
-        let of = |(source, touches): (&Source, Vec<usize>)| (source.clone(), touches.into_iter().map(time).collect());
-        object.sources().iter().zip(object.by_source()).map(of).collect()
+        let time = |touch: &Touch| touch.times()[1].micros().unwrap();
+        object
+            .pools()
+            .iter()
+            .map(|pool| (pool.source.clone(), object.of_pool(pool).iter().map(time).collect()))
+            .collect()
+    }
+
+    fn lengths(object: &ObjectTouches) -> Vec<usize> {
+        object.pools().iter().map(|pool| pool.range.len()).collect()
     }
 
     #[test]
     fn every_touch_keeps_its_source_whatever_is_done_with_it() {
-        let object = ObjectTouches::in_turn("cup", touches(30), &names(3), 2);
-        assert_eq!((0..4).map(|touch| object.source_of(touch)).collect::<Vec<_>>(), [2, 0, 1, 2]);
+        let object = ObjectTouches::in_turn("cup", touches(0..30), &names(3), 2);
         let is_of_its_source = |object: &ObjectTouches| {
             times(object).into_iter().all(|(source, times)| {
                 times.iter().all(|time| source == Source::Instance(names(3)[((time + 2) % 3) as usize].clone()))
@@ -513,30 +434,30 @@ mod tests {
         };
         let late = |touch: &Touch| touch.times()[1].micros().unwrap() >= 20;
         let doubled = {
-            let mut twice = object.select([4, 1]);
-            twice.append(&object.select([29, 0, 5]));
+            let mut twice = object.part(0.0, 0.3);
+            twice.append(&object.part(0.7, 1.0));
             twice
         };
-        for part in [object.select([7, 3, 3, 29, 1000]), object.filtered(late), object.thinned(6), doubled] {
-            assert!(is_of_its_source(&part), "{part:?}");
+        for part in [object.part(0.25, 0.5), object.filtered(late), object.thinned(6), doubled] {
+            assert!(!part.is_empty() && is_of_its_source(&part), "{part:?}");
         }
-        assert_eq!(object.thinned(6).by_source().iter().map(Vec::len).collect::<Vec<_>>(), [2, 2, 2]);
+        assert_eq!(lengths(&object.thinned(6)), [2, 2, 2]);
         let reversed = object.changed(|touch| Touch::from_micros([0, 29 - touch.times()[1].micros().unwrap(), 9]));
         assert_eq!(reversed.sources(), object.sources());
-        assert_eq!(object.select([0, 3]).sources(), [Source::Instance("cup 2".into())], "others have no touch");
-        assert_eq!(object.select([]).pools(), [Pool { source: 0, touches: Vec::new() }]);
+        let of_last = object.filtered(|touch| touch.times()[1].micros().unwrap() % 3 == 0);
+        assert_eq!(of_last.sources(), [&Source::Instance("cup 2".into())], "others have no touch");
+        assert!(object.part(0.5, 0.5).pools().is_empty());
     }
 
     #[test]
     fn placements_that_recordings_state_count_the_same_however_often_they_were_recorded() {
-        let recorded = |began: &str, placement: Option<&str>| {
-            let (object, began, placement) = ("cup".into(), began.into(), placement.map(str::to_owned));
-            Source::Recording(Recorded { object, began, placement, touches: 10, ..Recorded::default() })
-        };
         let of = |last: Option<&str>| {
-            let runs = [("1", Some("+z")), ("2", Some("+z")), ("3", last)];
-            let runs = runs.map(|(began, placement)| (recorded(began, placement), 10));
-            ObjectTouches::in_runs("cup", touches(30), runs.into())
+            let parts = [("1", Some("+z")), ("2", Some("+z")), ("3", last)].map(|(began, placement)| {
+                let placement = placement.map(str::to_owned);
+                let recorded = Recorded { began: began.into(), placement, ..Recorded::default() };
+                (Source::Recording(recorded), None, touches(0..10))
+            });
+            ObjectTouches::of_parts("cup", parts)
         };
         let stated = of(Some("-z"));
         assert_eq!(stated.placement_weights(), Some(vec![("+z".into(), 0.5), ("-z".into(), 0.5)]));
@@ -552,60 +473,37 @@ mod tests {
 
     #[test]
     fn touches_of_several_objects_stay_apart_when_they_are_joined() {
-        let one = ObjectTouches::new("fork", touches(2), Source::Object);
-        let two = ObjectTouches::in_turn("cup", touches(4), &names(2), 0);
+        let one = ObjectTouches::new("fork", touches(0..2), Source::Object);
+        let two = ObjectTouches::in_turn("cup", touches(0..4), &names(2), 0);
         let joined = ObjectTouches::joined("background", &[one, two]);
         let expected = [("fork", vec![0, 1]), ("cup/cup 0", vec![0, 2]), ("cup/cup 1", vec![1, 3])];
         assert_eq!(times(&joined), expected.map(|(name, times)| (Source::Instance(name.into()), times)));
     }
 
     #[test]
-    fn runs_are_as_long_as_they_say_and_the_last_one_takes_the_rest() {
-        let runs = |counts: &[u64]| names(9).into_iter().map(Source::Instance).zip(counts.iter().copied()).collect();
-        let lengths = |counts: &[u64]| {
-            let object = ObjectTouches::in_runs("cup", touches(10), runs(counts));
-            object.by_source().iter().map(Vec::len).collect::<Vec<_>>()
-        };
-        assert_eq!(lengths(&[3, 0, 4]), [3, 7]);
-        assert_eq!(lengths(&[8, 8, 8]), [8, 2]);
-        assert_eq!(lengths(&[]), [10]);
-    }
-
-    #[test]
-    fn numbers_of_instances_may_be_any_and_in_any_order() {
-        let numbers = [7, -1, 7, 3, -1];
-        let numbered: Vec<(Touch, i64)> = touches(5).into_iter().zip(numbers).collect();
-        let expected = [("-1", vec![1, 4]), ("3", vec![3]), ("7", vec![0, 2])];
-        let expected = expected.map(|(name, times)| (Source::Instance(name.into()), times));
-        assert_eq!(times(&ObjectTouches::numbered("cup", &numbered)), expected);
-        assert_eq!(ObjectTouches::numbered("cup", &numbered[..1]).sources(), [Source::Object]);
-    }
-
-    #[test]
     fn pools_are_of_one_source_and_one_robot() {
         let noise = with!(Noise::default(), speed_bias = 0.1);
         for (instances, robots, pools) in [(1, 3, 3), (4, 1, 4), (4, 2, 4), (4, 3, 12), (1, 1, 1)] {
-            let object = ObjectTouches::in_turn("cup", touches(240), &names(instances), 0).noisy(&noise, 1, robots);
-            let found = object.pools();
-            assert_eq!(found.len(), pools);
-            for (turn, pool) in found.iter().enumerate() {
-                let expected: Vec<u32> = (turn as u32..240).step_by(pools).collect();
-                assert_eq!((&pool.touches, pool.source), (&expected, turn % instances), "{instances}, {robots}");
-            }
-            // A part of them is of the same robots.
-            let part = object.select(100..200);
-            assert_eq!(part.pools().len(), pools);
-            assert!(part.pools().iter().all(|pool| pool.touches.windows(2).all(|two| two[1] - two[0] == pools as u32)));
+            let object = ObjectTouches::in_turn("cup", touches(0..240), &names(instances), 0);
+            let noisy = object.noisy(&noise, 1, robots);
+            assert_eq!((lengths(&noisy), noisy.sources()), (vec![240 / pools; pools], object.sources()));
+            let first: Vec<_> = noisy.pools().iter().take(instances).map(|pool| &pool.source).collect();
+            assert_eq!(first, object.sources(), "in turn");
+            let found: std::collections::BTreeSet<_> = noisy.pools().iter().map(|pool| pool.robot).collect();
+            assert_eq!((found.len(), noisy.has_robots()), (robots, robots > 1));
+            // A part of them is of the same robots, and these stay with what is added later.
+            assert_eq!(noisy.part(0.2, 0.6).pools().len(), pools);
+            let again = noisy.noisy(&noise, 2, 7);
+            assert!(again.pools().iter().map(|pool| pool.robot).eq(noisy.pools().iter().map(|pool| pool.robot)));
         }
     }
 
     #[test]
     fn recordings_of_different_lengths_are_pools_by_themselves() {
-        let runs = vec![(Source::Log("a".into()), 7), (Source::Log("b".into()), 2)];
-        let object = ObjectTouches::in_runs("cup", touches(9), runs);
-        let pools = object.pools();
-        assert_eq!((pools[0].touches.len(), pools[1].touches.as_slice()), (7, &[7, 8][..]));
+        let logs = [("a", 7), ("b", 2)].map(|(log, count)| (Source::Log(log.into()), None, touches(0..count)));
+        let object = ObjectTouches::of_parts("cup", logs);
+        assert_eq!(lengths(&object), [7, 2]);
         let bias = with!(Noise::default(), speed_bias = 0.1);
-        assert_eq!(object.noisy(&bias, 1, 4).pools().iter().map(|pool| pool.source).collect::<Vec<_>>(), [0, 1, 0, 1]);
+        assert_eq!(lengths(&object.noisy(&bias, 1, 4)), [4, 1, 3, 1]);
     }
 }

@@ -4,7 +4,7 @@ use super::alike::{Alike, other_position};
 use super::checksum::CRC;
 use super::files::{PARQUET, files, is_log, logs, name_of, of_extension, whole_lines};
 use super::finding::{Finding, Sink};
-use super::{Entry, Listing, Log, Longest, ObjectTouches, Source, text};
+use super::{Entry, Listing, Log, Longest, ObjectTouches, PoolFile, Source, text};
 use crate::error::{Error, Place, Result, problem};
 use palpate_shared::Touch;
 use std::collections::BTreeMap;
@@ -59,48 +59,47 @@ pub(super) fn read(directory: &Path, sink: &mut dyn Sink) -> Result<Content> {
 /// The objects that a listing names. Those whose recording was interrupted before its first touch are left out.
 fn listed(directory: &Path, listing: &Listing, sink: &mut dyn Sink) -> Result<Vec<Found>> {
     let mut objects = Vec::with_capacity(listing.objects.len());
-    let longest = listing.origin.longest();
     for entry in &listing.objects {
-        let file = entry.file(directory);
-        let (touches, is_right) = read_listed(entry, &file, listing.is_recorded(), &longest, sink)?;
-        if touches.is_empty() {
-            continue;
+        let mut parts = Vec::with_capacity(entry.pools.len());
+        for pool in &entry.pools {
+            let file = entry.path(directory, pool);
+            let touches = read_listed(entry, pool, &file, &listing.origin.longest(), sink)?;
+            if let Some(first) = touches.first() {
+                let has_position = first.position().is_some();
+                if has_position != listing.origin.position {
+                    let other = other_position(has_position, "the touches that dataset.json states");
+                    sink.fault(other.at(Place::file(&file)))?;
+                }
+            }
+            parts.push((pool.source(), pool.robot, touches));
         }
-        let has_position = touches.iter().any(|touch| touch.position().is_some());
-        if has_position != listing.origin.position {
-            sink.fault(other_position(has_position, "the touches that dataset.json states").at(Place::file(&file)))?;
-        }
-        let touches = match is_right {
-            true => listing.with_sources(entry, touches),
-            // The listing is not for touches of which some are missing.
-            false => Ok(ObjectTouches::new(&entry.name, touches, Source::Object)),
-        };
-        match touches {
-            Ok(touches) => objects.push(Found { touches, file, is_logged: false }),
-            Err(error) => sink.fault(error.in_file(Listing::path(directory)))?,
+        let file = entry.pools.first().map_or_else(PathBuf::new, |pool| entry.path(directory, pool));
+        let touches = ObjectTouches::of_parts(&entry.name, parts).of_origin(&listing.origin);
+        if !touches.is_empty() {
+            objects.push(Found { touches, file, is_logged: false });
         }
     }
     objects.sort_by(|a, b| a.touches.name.cmp(&b.touches.name));
     Ok(objects)
 }
 
-/// The touches of a listed object's file, and whether they are those that the listing states. A file that `may_grow`, since a real
-/// probe's touches are added to it, may hold more than listed; what follows its last whole line is not read.
+/// The touches of a listed file. That of a recording may hold more than listed; what follows its last whole line is not read.
 pub(super) fn read_listed(
     entry: &Entry,
+    pool: &PoolFile,
     path: &Path,
-    may_grow: bool,
     longest: &Longest,
     sink: &mut dyn Sink,
-) -> Result<(Vec<Touch>, bool)> {
+) -> Result<Vec<Touch>> {
     const RESTORE: &str = "Restore the file or capture the objects again, or remove dataset.json if this is meant.";
     let at = |error: Error| error.fix(RESTORE).at(Place::file(path));
+    let may_grow = pool.recorded.is_some();
     let bytes = match std::fs::read(path) {
         Err(error) if error.kind() == ErrorKind::NotFound => {
-            if !may_grow || entry.touches > 0 {
+            if !may_grow || pool.touches > 0 {
                 sink.fault(at(problem!("missing, although dataset.json lists the object {}", entry.name)))?;
             }
-            return Ok((Vec::new(), false));
+            return Ok(Vec::new());
         }
         read => read.map_err(|error| Error::io(path, "read the touches", error))?,
     };
@@ -110,17 +109,16 @@ pub(super) fn read_listed(
         let what = "its last line is not whole and was not read: a recording was interrupted";
         sink.warning(Finding::warning(path, what, "Record the touch again if it matters."));
     }
-    let (stated, found) = (entry.touches, touches.len() as u64);
-    let is_as_many = found == stated || (may_grow && found > stated);
+    let (stated, found) = (pool.touches, touches.len() as u64);
     if is_right && found == 0 && !may_grow {
         sink.fault(text::no_touches().at(Place::file(path)))?;
-    } else if is_right && !is_as_many {
+    } else if is_right && found != stated && !(may_grow && found > stated) {
         sink.fault(at(problem!("{found} touches where dataset.json states {stated}")))?;
-    } else if found == stated && entry.crc32.is_some_and(|stated| stated != CRC.checksum(lines)) {
+    } else if found == stated && pool.crc32.is_some_and(|stated| stated != CRC.checksum(lines)) {
         let what = format_args!("changed since its capture: its checksum is not the one in {}", Listing::FILE);
         sink.warning(Finding::warning(path, what, "Capture it again if that is not meant."));
     }
-    Ok((touches, is_right && is_as_many))
+    Ok(touches)
 }
 
 /// Every object that has a file.

@@ -3,13 +3,9 @@
 /// A recording of one object: when, from where and by what its touches came.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Recorded {
-    /// The object's name.
-    pub object: String,
-    /// The placement that it lay in on a table, where the recording states one.
+    /// The placement that the object lay in on a table, where the recording states one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub placement: Option<String>,
-    /// Number of touches that the recording added.
-    pub touches: u64,
     /// Time at which it began, in UTC: `2026-11-22T11:00:00Z`.
     pub began: String,
     /// Source of the touches: a port or a file.
@@ -20,7 +16,4 @@ pub struct Recorded {
     /// The checksum of the chip's model, which says how long the chip waits for a finger; none without a model.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model: Option<u32>,
-    /// The CRC-32 of its lines, if they came from a file: so that no file is recorded twice.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub crc32: Option<u32>,
 }

@@ -1,6 +1,7 @@
 //! A data set in memory, to the disk.
 
-use super::{Dataset, Entry, Listing, Lying, ObjectTouches, Source, Writer, files, write_touch};
+use super::text::lines;
+use super::{Dataset, Entry, Listing, ObjectTouches, Writer, files};
 use crate::error::{Place, Result, problem};
 use crate::wording::first_ten;
 use std::path::Path;
@@ -9,20 +10,16 @@ use std::path::Path;
 const CHUNK: usize = 4096;
 
 impl Dataset {
-    /// Writes the data set into a directory that holds none, whole or not at all: a file for each object and, if the origin of
-    /// the touches is known, `dataset.json`, which says which touches are of which instance, and which recordings they are
-    /// from. Text holds poses only if the origin says so or is unknown, or the
-    /// touches are recorded.
-    ///
-    /// Touches of instances that are not in turn, such as a part of a capture, are written one instance after the other,
-    /// those of recordings one recording after the other.
+    /// Writes the data set into a directory that holds none, whole or not at all: a file for each pool and, if the origin of
+    /// the touches is known, `dataset.json`, which says what each file is of. Text holds poses only if the origin says so or is
+    /// unknown, or the touches are recorded.
     ///
     /// `approaches` says how many approaches each object took, if known: it is written down as 0 where it is
     /// not, such as for a part of a capture.
     ///
     /// # Errors
-    /// When the directory holds touches; when an object has several instances or logs, and there would be no `dataset.json`
-    /// to say so, or has touches of robots that differ; when a file cannot be written.
+    /// When the directory holds touches; when an object has several pools, and there would be no `dataset.json` to say what
+    /// they are of; when a file cannot be written.
     pub fn write(&self, directory: &Path, approaches: Option<&[u64]>) -> Result<()> {
         let there = if directory.exists() { files(directory)? } else { Vec::new() };
         let mut names: Vec<String> = there.iter().filter_map(|(_, path)| path.file_name()).map(lossy).collect();
@@ -35,80 +32,42 @@ impl Dataset {
                 .at(Place::file(directory)));
         }
         let origin = &self.origin;
-        let of_several = |object: &&ObjectTouches| object.sources().len() > 1;
+        let of_several = |object: &&ObjectTouches| object.pools().len() > 1;
         if let (None, Some(several)) = (origin, self.objects.iter().find(of_several)) {
-            let (name, sources) = (&several.name, several.sources().len());
+            let (name, pools) = (&several.name, several.pools().len());
             return Err(problem!(
-                "{name} has {sources} instances or logs, and without a known probe no dataset.json states the source of each touch"
+                "{name} has touches of {pools} instances, logs or robots, and without a known probe no dataset.json states which \
+                 file is of which"
             )
             .fix(
                 "Say which probe made them (from Python `probe=`), or record each log with `palpate data record`.",
             )
             .at(Place::file(directory)));
         }
-        if let Some(object) = self.objects.iter().find(|object| object.has_robots()) {
-            let name = &object.name;
-            return Err(problem!(
-                "the touches of {name} are of robots with different biases, and no file states the robot of each touch"
-            )
-            .fix("Write them without noise, and add it where they are read.")
-            .at(Place::file(directory)));
-        }
         let poses = origin.as_ref().is_none_or(|origin| origin.pose) || self.is_recorded();
-        let mut listing = Listing::new(&origin.clone().unwrap_or_default(), self.names());
-        listing.recorded = self.recorded();
-        let first = origin.as_ref().map_or(0, |origin| origin.samples().start);
+        let entry = |object: &ObjectTouches| {
+            Entry::of(&object.name, object.pools().iter().map(|pool| (&pool.source, pool.robot)))
+        };
+        let listing = Listing {
+            objects: self.objects.iter().map(entry).collect(),
+            ..Listing::new(&origin.clone().unwrap_or_default(), [])
+        };
         let mut writer = Writer::begin(directory, listing)?;
         for (index, object) in self.objects.iter().enumerate() {
-            let mut file = writer.file(index)?;
-            let object = arranged(object, first, file.entry);
-            for touches in object.touches().chunks(CHUNK) {
-                let mut lines = String::new();
-                touches.iter().for_each(|touch| write_touch(&mut lines, touch, poses));
-                file.write(&lines, touches.len() as u64, 0)?;
+            let mut files = writer.object(index)?;
+            for (pool, touches) in object.pools().iter().map(|pool| object.of_pool(pool)).enumerate() {
+                for touches in touches.chunks(CHUNK) {
+                    files.write(pool, &lines(touches, poses), touches.len() as u64)?;
+                }
             }
-            file.entry.approaches = match (approaches.and_then(|approaches| approaches.get(index)), origin) {
+            files.close(match (approaches.and_then(|approaches| approaches.get(index)), origin) {
                 (Some(&approaches), _) => approaches,
                 (None, Some(origin)) if origin.approaches => object.len() as u64,
                 (None, _) => 0,
-            };
-            file.close()?;
+            })?;
         }
         writer.finish(origin.is_some(), &[])
     }
-}
-
-/// An object's touches in the order in which a listing can say what each is of, which it then says. Sample `first` is the
-/// first one.
-fn arranged(object: &ObjectTouches, first: u64, entry: &mut Entry) -> ObjectTouches {
-    let name = |source: &Source| match source {
-        Source::Object => object.name.clone(),
-        Source::Instance(name) => name.clone(),
-        Source::Placement { instance, .. } => instance.clone().unwrap_or_default(),
-        Source::Log(path) => path.display().to_string(),
-        Source::Recording(_) => String::new(),
-    };
-    let count = object.sources().len() as u64;
-    let is_recorded = object.sources().iter().any(|source| matches!(source, Source::Recording(_)));
-    entry.placements = object.sources().iter().filter_map(Lying::of).collect();
-    if count > 1 && !is_recorded {
-        entry.instances = object.sources().iter().map(name).filter(|name| !name.is_empty()).collect();
-        if !entry.placements.is_empty() {
-            entry.instances.dedup();
-        }
-        let is_in_turn = |touch: usize| object.source_of(touch) as u64 == (first % count + touch as u64) % count;
-        if (0..object.len()).all(is_in_turn) {
-            return object.clone();
-        }
-        entry.counts = object.by_source().iter().map(|touches| touches.len() as u64).collect();
-    }
-    let mut by_source: Vec<_> = object.sources().iter().zip(object.by_source()).collect();
-    // As the data set lists its recordings.
-    by_source.sort_by_key(|(source, _)| match source {
-        Source::Recording(recorded) => recorded.began.clone(),
-        _ => String::new(),
-    });
-    object.select(by_source.into_iter().flat_map(|(_, touches)| touches))
 }
 
 fn lossy(name: &std::ffi::OsStr) -> String {
@@ -121,7 +80,7 @@ mod tests {
     use crate::with;
 
     use crate::probe::noise::Noise;
-    use crate::touches::{ObjectTouches, Origin, Recorded, folds, parse_touch};
+    use crate::touches::{ObjectTouches, Origin, Recorded, Source, folds, parse_touch};
 
     fn dataset(origin: Option<Origin>) -> Dataset {
         let lines = ["0 0.001 -", "- - 0", "0.000000 0.123456 1.200001 1 0 0 0 1 0"];
@@ -147,47 +106,29 @@ mod tests {
         let names = ["mug", "glass"].map(String::from);
         let instances = ["cup", "vase"].map(|name| ObjectTouches::in_turn(name, touches(31), &names, 0));
         let recordings = ["cup", "vase"].map(|object| {
-            let recorded = |(began, touches): (&str, u64)| {
-                let (object, began, crc32) = (object.into(), began.into(), Some(7));
-                Recorded { object, touches, began, crc32, ..Recorded::default() }
-            };
-            let runs = [("2026-11-22T11:00:00Z", 20), ("2026-11-22T12:00:00Z", 4), ("2026-11-22T13:00:00Z", 7)];
-            let runs = runs.map(recorded).map(|one| (one.touches, Source::Recording(one))).map(|(n, one)| (one, n));
-            ObjectTouches::in_runs(object, touches(31), runs.into())
+            let began = [("2026-11-22T11:00:00Z", 20), ("2026-11-22T12:00:00Z", 4), ("2026-11-22T13:00:00Z", 7)];
+            let parts = began.map(|(began, count)| {
+                let recorded = Recorded { began: began.into(), ..Recorded::default() };
+                (Source::Recording(recorded), None, touches(count))
+            });
+            ObjectTouches::of_parts(object, parts)
         });
         [instances, recordings].map(|objects| Dataset { origin: Some(origin.clone()), ..Dataset::new(objects.into()) })
     }
 
-    /// A key of each source's touches, for each object, regardless of their order.
-    fn by_source(dataset: &Dataset) -> Vec<(String, Vec<palpate_shared::Touch>)> {
-        let mut all = Vec::new();
-        for object in &dataset.objects {
-            for (source, touches) in object.sources().iter().zip(object.by_source()) {
-                let source = match source {
-                    Source::Recording(recorded) => recorded.began.clone(),
-                    other => format!("{other:?}"),
-                };
-                let mut touches: Vec<_> = touches.into_iter().map(|touch| object.touches()[touch]).collect();
-                touches.sort_by_key(|touch| touch.times()[1].micros());
-                all.push((format!("{} {source}", object.name), touches));
-            }
-        }
-        all.sort_by(|a, b| a.0.cmp(&b.0));
-        all
-    }
-
     #[test]
-    fn a_copy_on_the_disk_knows_instances_and_recordings() {
+    fn a_copy_on_the_disk_knows_instances_recordings_and_robots() {
         let origin = Origin { touches: 31, ..Origin::default() };
         for dataset in of_several(&origin) {
             let folds::Split { train, test } = folds::split(&dataset, 0.3, 1).unwrap();
-            for (part, is_whole) in [(&dataset, true), (&train, false), (&test, false)] {
+            let mut of_robots = dataset.clone();
+            of_robots.add_noise(&with!(Noise::default(), speed_bias = 0.1), 1, 3);
+            assert!(of_robots.objects[0].has_robots());
+            for part in [&dataset, &train, &test, &of_robots] {
                 let directory = tempfile::tempdir().unwrap();
                 part.write(directory.path(), None).unwrap();
                 let read = Dataset::read(directory.path()).unwrap();
-                assert_eq!(by_source(&read), by_source(part));
-                assert_eq!((read.recorded(), read.is_recorded()), (part.recorded(), part.is_recorded()));
-                assert!(!is_whole || read == *part);
+                assert_eq!((&read, read.is_recorded()), (part, part.is_recorded()));
                 // What a real probe made is never replaced.
                 let settings = crate::capture::Settings { force: true, ..origin.clone().into() };
                 let objects = ["cup", "vase"].map(|name| crate::mesh::Object::new(name, crate::mesh::Mesh::globe(6)));
@@ -211,12 +152,9 @@ mod tests {
     fn what_no_listing_could_say_is_not_written() {
         let [instances, _] = of_several(&Origin::default());
         let directory = tempfile::tempdir().unwrap();
-        let refused = |dataset: &Dataset| dataset.write(directory.path(), None).unwrap_err().to_string();
-        let unknown = Dataset { origin: None, ..instances.clone() };
-        assert!(refused(&unknown).contains("cup has 2 instances or logs"), "{}", refused(&unknown));
-        let mut robots = instances;
-        robots.add_noise(&with!(Noise::default(), speed_bias = 0.1), 1, 3);
-        assert!(refused(&robots).contains("the touches of cup are of robots"), "{}", refused(&robots));
+        let unknown = Dataset { origin: None, ..instances };
+        let refused = unknown.write(directory.path(), None).unwrap_err().to_string();
+        assert!(refused.contains("cup has touches of 2 instances, logs or robots"), "{refused}");
         assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 0);
     }
 

@@ -249,6 +249,13 @@ pub fn write_touch(line: &mut String, touch: &Touch, pose: bool) {
     line.push('\n');
 }
 
+/// The lines of touches, each as [`write_touch`] writes it.
+pub(crate) fn lines<'t>(touches: impl IntoIterator<Item = &'t Touch>, pose: bool) -> String {
+    let mut lines = String::new();
+    touches.into_iter().for_each(|touch| write_touch(&mut lines, touch, pose));
+    lines
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -104,7 +104,7 @@ impl Findings {
             self.note(&path, &what, "Record its touches with `palpate data record`, or move it away.");
         }
         for (name, path) in super::files(directory)? {
-            if listing.objects.iter().all(|entry| entry.name != name) {
+            if listing.paths(directory).all(|listed| listed != path) {
                 let what = format!("the object {name} is not listed in {}, so it is not read", Listing::FILE);
                 self.note(&path, &what, "Capture all objects together, or remove the file.");
             }

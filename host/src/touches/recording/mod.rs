@@ -1,27 +1,29 @@
 //! Touches of a real probe on their way to the disk.
 //!
-//! Each touch is a line appended to `<object>.txt` and flushed to the disk before the next one is waited for, so that
-//! any end of a recording (a pulled cable, Ctrl-C, a power cut) costs at most the touch that is being written. The
+//! Each recording is a file. Each touch is a line appended to it and flushed to the disk before the next one is waited for, so
+//! that any end of a recording (a pulled cable, Ctrl-C, a power cut) costs at most the touch that is being written. The
 //! listing follows twice a second and at the end; until then a file may hold more than is listed. Readers count what the
-//! file holds, up to the last whole line, and the next recording cuts off what is behind it.
+//! file holds, up to the last whole line.
 
 #[cfg(test)]
 mod tests;
 
 use super::alike::other_position;
 use super::checksum::CRC;
-use super::files::{check_name, files, whole_lines};
+use super::files::{check_name, files};
 use super::finding::Strict;
 use super::read::read_listed;
 use super::recorded::Recorded;
-use super::{Entry, Finding, Listing, Origin, write_touch};
+use super::text::lines;
+use super::writer::make;
+use super::{Entry, Finding, Listing, Origin, PoolFile};
 use crate::error::{Error, Place, Result, problem};
 use crate::output;
 use crc::{Digest, Table};
 use palpate_shared::Touch;
 use palpate_shared::format::Length;
 use std::fs::File;
-use std::io::{Seek, SeekFrom, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
@@ -31,10 +33,10 @@ const CHECKPOINT: Duration = Duration::from_millis(500);
 /// A data set to which touches of an object are added.
 pub struct Recording {
     directory: PathBuf,
-    path: PathBuf,
+    object: String,
     listing: Listing,
-    /// Statement of this recording about itself; among the listed ones once it has a touch.
     recorded: Recorded,
+    /// Its file, once it has a touch.
     open: Option<Open>,
     /// Touches of the object that earlier recordings added.
     before: u64,
@@ -46,8 +48,11 @@ pub struct Recording {
     _lock: File,
 }
 
-/// The object's file.
+/// The file of a recording, and its entry in the listing.
 struct Open {
+    path: PathBuf,
+    /// Positions of the object, and of the file among those of the object.
+    place: [usize; 2],
     file: File,
     digest: Digest<'static, u32, Table<16>>,
 }
@@ -62,7 +67,7 @@ impl Recording {
     /// # Errors
     /// When the directory cannot be read, another program is writing into it, or it holds simulated touches, files that
     /// no listing names, or touches that were recorded with another probe, at another scale, or with the pose where these
-    /// are without it; when `object` cannot be a file's name; when the object's file has lost touches.
+    /// are without it; when `object` cannot be a file's name; when a file of the object has lost touches.
     pub fn open(
         directory: &Path,
         object: &str,
@@ -103,13 +108,7 @@ impl Recording {
                 Listing::new(&origin.cloned().unwrap_or_else(usual), [])
             }
         };
-        let path = Entry { name: object.into(), ..Entry::default() }.file(directory);
-        let is_listed = listing.objects.iter().any(|entry| entry.name == object);
-        if !is_listed && path.metadata().is_ok_and(|there| there.len() > 0) {
-            return Err(unlisted(&path.file_name().unwrap_or_default().display().to_string()));
-        }
         let recorded = Recorded {
-            object: object.into(),
             placement: placement.map(str::to_owned),
             began: humantime::format_rfc3339_seconds(began).to_string(),
             source: source.into(),
@@ -117,7 +116,7 @@ impl Recording {
         };
         let mut recording = Self {
             directory: directory.into(),
-            path,
+            object: object.into(),
             listing,
             recorded,
             open: None,
@@ -127,31 +126,32 @@ impl Recording {
             checkpointed: Instant::now(),
             _lock: lock,
         };
-        recording.before = recording.take_up()?;
+        recording.before = recording.count_earlier()?;
         Ok(recording)
     }
 
-    /// Brings what is listed of the object in line with its file, and returns how many touches there are.
-    fn take_up(&mut self) -> Result<u64> {
-        let object = &self.recorded.object;
-        let Some(entry) = self.listing.objects.iter_mut().find(|entry| entry.name == *object) else { return Ok(0) };
-        let longest = self.listing.origin.longest();
-        let mut sink = Strict::default();
-        let touches = read_listed(entry, &self.path, true, &longest, &mut sink)?.0.len() as u64;
-        self.warnings = sink.0;
-        // What an interrupted recording had not listed is its own.
-        let more = touches - entry.touches;
-        if let Some(last) = self.listing.recorded.iter_mut().rev().find(|recorded| recorded.object == *object) {
-            last.touches += more;
+    /// Number of touches that earlier recordings of the object hold, which are then listed.
+    fn count_earlier(&mut self) -> Result<u64> {
+        let Some(entry) = self.listing.objects.iter_mut().find(|entry| entry.name == self.object) else { return Ok(0) };
+        let (directory, longest, mut sink) = (&self.directory, self.listing.origin.longest(), Strict::default());
+        let mut count = |pool: &PoolFile| {
+            let touches = read_listed(entry, pool, &entry.path(directory, pool), &longest, &mut sink)?;
+            Ok(touches.len() as u64)
+        };
+        let counts = entry.pools.iter().map(&mut count).collect::<Result<Vec<u64>>>()?;
+        for (pool, touches) in entry.pools.iter_mut().zip(&counts) {
+            // An interrupted recording holds more than it had listed.
+            if pool.touches != *touches {
+                (pool.touches, pool.crc32) = (*touches, None);
+            }
         }
-        entry.touches = touches;
-        entry.approaches = touches;
-        Ok(touches)
+        self.warnings = sink.0;
+        Ok(counts.iter().sum())
     }
 
     /// The object's name.
     pub fn object(&self) -> &str {
-        &self.recorded.object
+        &self.object
     }
 
     /// The placement of the touches that are added, where one is stated.
@@ -171,7 +171,7 @@ impl Recording {
 
     /// Number of touches of the object there are now.
     pub fn all_touches(&self) -> u64 {
-        self.before + self.recorded.touches
+        self.before + self.added
     }
 
     /// Says which program made the touches that follow, and with which model, by its checksum. Returns what made the newest
@@ -180,14 +180,14 @@ impl Recording {
     /// # Errors
     /// When the listing cannot be written.
     pub(crate) fn made_by(&mut self, firmware: Option<String>, model: Option<u32>) -> Result<Option<String>> {
-        let newest = self.listing.recorded.iter().rev().find_map(|recorded| recorded.firmware.clone());
+        let all = self.listing.objects.iter().flat_map(|entry| &entry.pools).filter_map(|pool| pool.recorded.as_ref());
+        let newest = all.max_by_key(|recorded| &recorded.began).and_then(|recorded| recorded.firmware.clone());
         let other = newest.filter(|other| firmware.as_ref().is_some_and(|own| own != other));
         let is_same = self.recorded.firmware == firmware && self.recorded.model == model;
-        if !is_same && self.recorded.touches > 0 {
+        if !is_same && self.open.is_some() {
             // Another program since the cable was out: a recording of its own.
             self.checkpoint()?;
-            self.before += self.recorded.touches;
-            self.recorded.touches = 0;
+            self.open = None;
         }
         (self.recorded.firmware, self.recorded.model) = (firmware, model);
         Ok(other)
@@ -222,15 +222,15 @@ impl Recording {
     /// # Errors
     /// Errors of [`add`](Self::add), and when the same touches of the object were recorded before.
     pub fn add_all(&mut self, touches: &[Touch]) -> Result<()> {
-        let crc32 = CRC.checksum(lines(touches).as_bytes());
-        let is_same = |other: &&Recorded| {
-            (&other.object, other.crc32, other.touches) == (&self.recorded.object, Some(crc32), touches.len() as u64)
-        };
-        if let Some(Recorded { object, touches, began, .. }) = self.listing.recorded.iter().find(is_same).cloned() {
-            return Err(problem!("the same {touches} touches of {object} were recorded before, on {began}")
+        let crc32 = Some(CRC.checksum(lines(touches, true).as_bytes()));
+        let count = touches.len() as u64;
+        let mut pools =
+            self.listing.objects.iter().filter(|entry| entry.name == self.object).flat_map(|entry| &entry.pools);
+        if let Some(same) = pools.find(|pool| pool.crc32 == crc32 && pool.touches == count) {
+            let began = same.recorded.as_ref().map_or("", |recorded| &recorded.began);
+            return Err(problem!("the same {count} touches of {} were recorded before, on {began}", self.object)
                 .fix("Give other lines."));
         }
-        self.recorded.crc32 = Some(crc32);
         self.append(touches)?;
         self.checkpoint()
     }
@@ -255,33 +255,21 @@ impl Recording {
             )
             .fix("Give the probe file the stroke that the hand has, and record into another directory."));
         }
-        let lines = lines(touches);
-        if self.recorded.touches == 0 {
-            self.list()?;
-        }
-        let path = &self.path;
-        let io = |error| Error::io(path, "write the touches", error);
         let open = match &mut self.open {
             Some(open) => open,
-            None => self.open.insert(Open::new(path)?),
+            None => self.open.insert(Open::new(&self.directory, &mut self.listing, &self.object, &self.recorded)?),
         };
         // In one piece, so that hardly anything can come in between.
-        open.file.write_all(lines.as_bytes()).and_then(|()| open.file.sync_data()).map_err(io)?;
+        let lines = lines(touches, true);
+        let written = open.file.write_all(lines.as_bytes()).and_then(|()| open.file.sync_data());
+        written.map_err(|error| Error::io(&open.path, "write the touches", error))?;
         open.digest.update(lines.as_bytes());
-        self.recorded.touches += touches.len() as u64;
+        let [object, pool] = open.place;
+        let entry = &mut self.listing.objects[object];
+        entry.pools[pool].touches += touches.len() as u64;
+        entry.approaches = entry.touches();
         self.added += touches.len() as u64;
         Ok(())
-    }
-
-    /// Lists this recording, before its first touch: a file that is not listed would not be read.
-    fn list(&mut self) -> Result<()> {
-        let object = &self.recorded.object;
-        if !self.listing.objects.iter().any(|entry| entry.name == *object) {
-            self.listing.objects.push(Entry { name: object.clone(), ..Entry::default() });
-            self.listing.objects.sort_by(|a, b| a.name.cmp(&b.name));
-        }
-        self.listing.recorded.push(self.recorded.clone());
-        self.listing.write(&self.directory)
     }
 
     /// Writes the listing as it is now. Without a touch there is nothing to list.
@@ -290,38 +278,37 @@ impl Recording {
     /// When it cannot be written.
     pub(crate) fn checkpoint(&mut self) -> Result<()> {
         self.checkpointed = Instant::now();
-        let (Some(open), Some(last)) = (&self.open, self.listing.recorded.last_mut()) else { return Ok(()) };
-        if self.recorded.touches > 0 {
-            last.clone_from(&self.recorded);
-        }
-        let all = self.before + self.recorded.touches;
-        if let Some(entry) = self.listing.objects.iter_mut().find(|entry| entry.name == self.recorded.object) {
-            (entry.touches, entry.approaches) = (all, all);
-            entry.crc32 = Some(open.digest.clone().finalize());
-        }
+        let Some(Open { place: [object, pool], digest, .. }) = &self.open else { return Ok(()) };
+        self.listing.objects[*object].pools[*pool].crc32 = Some(digest.clone().finalize());
         self.listing.write(&self.directory)
     }
 }
 
 impl Open {
-    /// Opens an object's file behind its last whole line; what follows that is cut off.
-    fn new(path: &Path) -> Result<Self> {
-        let io = |error| Error::io(path, "write the touches", error);
-        let mut file = File::options().write(true).create(true).truncate(false).open(path).map_err(io)?;
-        let mut there = std::fs::read(path).map_err(io)?;
-        there.truncate(whole_lines(&there).len());
-        file.set_len(there.len() as u64).map_err(io)?;
-        file.seek(SeekFrom::End(0)).map_err(io)?;
-        let mut digest = CRC.digest();
-        digest.update(&there);
-        Ok(Self { file, digest })
+    /// Lists a recording and makes its file, before its first touch: a file that is not listed would not be read.
+    fn new(directory: &Path, listing: &mut Listing, object: &str, recorded: &Recorded) -> Result<Self> {
+        let objects = &mut listing.objects;
+        let number = objects.iter().position(|entry| entry.name == object).unwrap_or_else(|| {
+            let place = objects.partition_point(|entry| entry.name.as_str() < object);
+            objects.insert(place, Entry { name: object.into(), ..Entry::default() });
+            place
+        });
+        let entry = &mut objects[number];
+        let place = [number, entry.pools.len()];
+        let file = entry.pools.last().map(|_| (entry.pools.len() + 1).to_string());
+        let pool = PoolFile { file, recorded: Some(recorded.clone()), ..PoolFile::default() };
+        let path = entry.path(directory, &pool);
+        entry.pools.push(pool);
+        listing.write(directory)?;
+        let file = make(&path).map_err(|error| Error::io(&path, "write the touches", error))?;
+        Ok(Self { path, place, file, digest: CRC.digest() })
     }
 }
 
 /// A recorded listing to add to.
 fn admit(listing: Listing, origin: Option<&Origin>) -> Result<Listing> {
     if !listing.is_recorded() {
-        let touches: u64 = listing.objects.iter().map(|entry| entry.touches).sum();
+        let touches: u64 = listing.objects.iter().map(Entry::touches).sum();
         return Err(problem!("holds {touches} simulated touches of {}", listing.names().join(", "))
             .fix("Give another directory: recorded and simulated touches are not mixed."));
     }
@@ -358,11 +345,4 @@ fn differences(there: &Origin, here: &Origin) -> Vec<String> {
         }
     }
     differences
-}
-
-/// The lines of touches; with the poses of those that have one.
-fn lines(touches: &[Touch]) -> String {
-    let mut lines = String::new();
-    touches.iter().for_each(|touch| write_touch(&mut lines, touch, true));
-    lines
 }

@@ -1,6 +1,6 @@
 use super::*;
 
-use crate::touches::Dataset;
+use crate::touches::{Dataset, ObjectTouches, Pool, Source};
 use std::fs;
 
 /// The second of October 2026, around noon.
@@ -47,6 +47,20 @@ fn read(directory: &Path) -> Dataset {
     dataset
 }
 
+/// The recordings of an object, with their numbers of touches.
+fn recorded(dataset: &Dataset, object: usize) -> Vec<(Recorded, usize)> {
+    let of = |pool: &Pool| match &pool.source {
+        Source::Recording(recorded) => (recorded.clone(), pool.range.len()),
+        other => panic!("{other:?}"),
+    };
+    dataset.objects[object].pools().iter().map(of).collect()
+}
+
+/// The touches of an object.
+fn all(dataset: &Dataset, object: usize) -> Vec<Touch> {
+    dataset.objects[object].touches().to_vec()
+}
+
 #[test]
 fn a_recording_is_a_data_set_whose_listing_says_when_from_where_and_by_what() {
     let directory = tempfile::tempdir().unwrap();
@@ -58,26 +72,22 @@ fn a_recording_is_a_data_set_whose_listing_says_when_from_where_and_by_what() {
     whole(directory.path(), "fork", 5..6);
     let dataset = read(directory.path());
     assert_eq!(dataset.names(), ["fork", "spoon"]);
-    assert_eq!(dataset.objects[1].touches(), touches(0..3));
+    assert_eq!(all(&dataset, 1), touches(0..3));
     assert!(dataset.is_recorded() && dataset.holds_approaches());
     let expected = Recorded {
-        object: "spoon".into(),
         placement: None,
-        touches: 3,
         began: "2026-10-02T12:00:00Z".into(),
         source: "/dev/ttyACM0".into(),
         firmware: Some("gpio 1.0".into()),
         model: Some(7),
-        crc32: None,
     };
-    // Both began at once.
-    assert_eq!(dataset.recorded()[1], expected);
-    assert_eq!(dataset.recorded()[0].firmware, None);
+    assert_eq!(recorded(&dataset, 1), [(expected, 3)]);
+    assert_eq!(recorded(&dataset, 0)[0].0.firmware, None);
     let listing = Listing::read(directory.path()).unwrap().unwrap();
     let text = fs::read(directory.path().join("spoon.txt")).unwrap();
     let entry = &listing.objects[1];
-    assert_eq!((entry.touches, entry.approaches), (3, 3));
-    assert_eq!(entry.crc32, Some(CRC.checksum(&text)));
+    assert_eq!((entry.pools[0].touches, entry.approaches), (3, 3));
+    assert_eq!(entry.pools[0].crc32, Some(CRC.checksum(&text)));
 }
 
 #[test]
@@ -93,18 +103,20 @@ fn every_touch_counts_although_the_recorder_was_killed_after_it() {
     let directory = tempfile::tempdir().unwrap();
     killed(directory.path(), "fork", 0..5);
     let listing = Listing::read(directory.path()).unwrap().unwrap();
-    assert!(listing.objects[0].touches < 5, "this test needs a listing that lags behind");
-    assert_eq!(read(directory.path()).objects[0].touches(), touches(0..5));
+    assert!(listing.objects[0].touches() < 5, "this test needs a listing that lags behind");
+    assert_eq!(all(&read(directory.path()), 0), touches(0..5));
     // The next recording lists them as they are.
     whole(directory.path(), "fork", 5..7);
     let dataset = read(directory.path());
-    assert_eq!(dataset.objects[0].touches(), touches(0..7));
-    assert_eq!(dataset.recorded().iter().map(|recorded| recorded.touches).collect::<Vec<_>>(), [5, 2]);
+    assert_eq!(all(&dataset, 0), touches(0..7));
+    assert_eq!(recorded(&dataset, 0).iter().map(|(_, touches)| *touches).collect::<Vec<_>>(), [5, 2]);
+    let listing = Listing::read(directory.path()).unwrap().unwrap();
+    assert_eq!((listing.objects[0].touches(), listing.objects[0].approaches), (7, 7));
 }
 
 #[test]
-fn a_recording_cut_off_at_any_byte_keeps_its_whole_lines_and_goes_on_behind_them() {
-    let lines = lines(&touches(0..2));
+fn a_recording_cut_off_at_any_byte_keeps_its_whole_lines_and_the_next_one_goes_on() {
+    let lines = lines(&touches(0..2), true);
     let line = lines.len() / 2;
     for cut in line..lines.len() {
         let directory = tempfile::tempdir().unwrap();
@@ -112,7 +124,7 @@ fn a_recording_cut_off_at_any_byte_keeps_its_whole_lines_and_goes_on_behind_them
         let path = directory.path().join("fork.txt");
         fs::write(&path, &lines[..cut]).unwrap();
         let dataset = Dataset::read_any(directory.path()).unwrap();
-        assert_eq!(dataset.objects[0].touches(), touches(0..1), "{cut}");
+        assert_eq!(all(&dataset, 0), touches(0..1), "{cut}");
         let said: Vec<String> = dataset.warnings.iter().map(ToString::to_string).collect();
         let half = "its last line is not whole and was not read: a recording was interrupted";
         assert_eq!(said, if cut == line { vec![] } else { vec![format!("{}: {half}", path.display())] }, "{cut}");
@@ -120,7 +132,8 @@ fn a_recording_cut_off_at_any_byte_keeps_its_whole_lines_and_goes_on_behind_them
         assert_eq!(recording.warnings(), dataset.warnings);
         recording.add(&touch(8)).unwrap();
         recording.checkpoint().unwrap();
-        assert_eq!(read(directory.path()).objects[0].touches(), [touch(0), touch(8)]);
+        let dataset = Dataset::read_any(directory.path()).unwrap();
+        assert_eq!((all(&dataset, 0), dataset.warnings.len()), (vec![touch(0), touch(8)], usize::from(cut > line)));
     }
 }
 
@@ -129,13 +142,13 @@ fn an_interruption_before_the_first_touch_leaves_the_other_objects_readable() {
     let directory = tempfile::tempdir().unwrap();
     whole(directory.path(), "fork", 0..3);
     let mut recording = open(directory.path(), "spoon").unwrap();
-    recording.list().unwrap();
+    Open::new(directory.path(), &mut recording.listing, "spoon", &recording.recorded).unwrap();
     drop(recording);
     assert_eq!(read(directory.path()).names(), ["fork"]);
     fs::write(directory.path().join("spoon.txt"), "0.0").unwrap();
     assert_eq!(Dataset::read_any(directory.path()).unwrap().names(), ["fork"]);
     whole(directory.path(), "spoon", 0..2);
-    assert_eq!(read(directory.path()).objects[1].touches(), touches(0..2));
+    assert_eq!(all(&read(directory.path()), 1), touches(0..2));
 }
 
 #[test]
@@ -171,9 +184,10 @@ fn another_program_on_the_chip_is_a_recording_of_its_own_and_is_said() {
     assert_eq!((recording.touches(), recording.all_touches()), (3, 3));
     drop(recording);
     let dataset = read(directory.path());
-    assert_eq!(dataset.objects[0].touches(), touches(0..3));
-    let recorded = dataset.recorded();
-    let said: Vec<_> = recorded.iter().map(|r| (r.firmware.as_deref().unwrap(), r.touches)).collect();
+    assert_eq!(all(&dataset, 0), touches(0..3));
+    let recorded = recorded(&dataset, 0);
+    let said: Vec<_> =
+        recorded.iter().map(|(recorded, touches)| (recorded.firmware.as_deref().unwrap(), *touches)).collect();
     assert_eq!(said, [("gpio 1.0", 2), ("gpio 2.0", 1)]);
 }
 
@@ -201,7 +215,7 @@ fn touches_of_another_probe_or_scale_or_without_their_pose_are_not_added() {
     says(recording.add(&touch(0)), "no pose, but this data set is recorded with one");
     let pose = palpate_shared::Pose { direction: [0, 0, -32767], alignment: [32767, 0, 0] };
     recording.add(&touch(0).with_pose(pose)).unwrap();
-    assert_eq!(read(posed.path()).objects[0].touches(), [touch(0).with_pose(pose)]);
+    assert_eq!(all(&read(posed.path()), 0), [touch(0).with_pose(pose)]);
     let position = palpate_shared::Position { micrometers: [1, -2, 3] };
     let located = touch(0).with_pose(pose).with_position(position);
     says(recording.add(&located), "a position, where the touches recorded here have none");
@@ -210,7 +224,7 @@ fn touches_of_another_probe_or_scale_or_without_their_pose_are_not_added() {
     let mut recording = Recording::open(directory.path(), "fork", Some(&origin), "", noon()).unwrap();
     says(recording.add(&touch(0).with_pose(pose)), "no position, where the touches recorded here have one");
     recording.add(&located).unwrap();
-    assert_eq!(read(directory.path()).objects[0].touches(), [located]);
+    assert_eq!(all(&read(directory.path()), 0), [located]);
 }
 
 #[test]
@@ -237,5 +251,5 @@ fn the_touches_of_a_file_are_added_once() {
     add("fork", 0..4).unwrap();
     add("spoon", 0..5).unwrap();
     let dataset = read(directory.path());
-    assert_eq!(dataset.objects.iter().map(|object| object.touches().len()).collect::<Vec<_>>(), [9, 5]);
+    assert_eq!(dataset.objects.iter().map(ObjectTouches::len).collect::<Vec<_>>(), [9, 5]);
 }
