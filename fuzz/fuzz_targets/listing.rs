@@ -10,9 +10,10 @@ fuzz_target!(|bytes: &[u8]| {
     let directory = Path::new("data");
     match Listing::parse(bytes, &Listing::path(directory)) {
         Ok(listing) => {
-            for entry in &listing.objects {
-                let file = entry.file(directory);
-                assert_eq!(file.parent(), Some(directory), "{}", file.display());
+            for (entry, pool) in listing.objects.iter().flat_map(|entry| entry.pools.iter().map(move |pool| (entry, pool))) {
+                let file = entry.path(directory, pool);
+                let above = if pool.file.is_some() { directory.join(&entry.name) } else { directory.into() };
+                assert_eq!(file.parent(), Some(above.as_path()), "{}", file.display());
             }
             let text = serde_json::to_vec(&listing).expect("a listing is JSON");
             assert_eq!(Listing::parse(&text, directory).expect("what was written can be read"), listing);

@@ -31,7 +31,7 @@ def captured(seed):
 
 def weights_in(directory):
     objects = json.loads((Path(directory) / "dataset.json").read_text())["objects"]
-    return {entry["name"]: [placement["weight"] for placement in entry["placements"]] for entry in objects}
+    return {entry["name"]: [pool["placement"]["weight"] for pool in entry["pools"]] for entry in objects}
 
 
 def of_placements(data):

@@ -453,9 +453,8 @@ fn recognize(model: &Model<'_>, touched: &ObjectTouches) -> Result<Recognition> 
         approaches += 1;
         recognizer.push(touch).ok().filter(|verdict| *verdict != Verdict::Undecided)
     };
-    let pools = touched.pools();
-    let order = pools.iter().take(1).flat_map(|pool| &pool.touches);
-    let verdict = order.filter_map(|&touch| touched.touches().get(touch as usize)).find_map(&mut push);
+    let mut first = touched.pools().iter().take(1).flat_map(|pool| touched.of_pool(pool));
+    let verdict = first.find_map(&mut push);
     let best = recognizer.best();
     let recognized = matches!(verdict, Some(Verdict::Recognized { .. })).then(|| model.object_name(best).into());
     let posterior = recognizer.posterior(best).to_f64();

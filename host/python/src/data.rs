@@ -12,10 +12,11 @@ use palpate::error::{Error, problem};
 use palpate::shared::format::Length;
 use palpate::shared::{Q15_ONE, Touch};
 use palpate::touches::{
-    Dataset, Listing, Longest, ObjectTouches, Origin, Surroundings, folds, located, touch_of_seconds,
+    Dataset, Listing, Longest, ObjectTouches, Origin, Pool, Source, Surroundings, folds, located, touch_of_seconds,
 };
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -157,7 +158,8 @@ impl DataSet {
         if let Some(pair) = order.windows(2).find(|pair| names[pair[0]] == names[pair[1]]) {
             return Err(Error::setting("names", format!("{} twice", names[pair[0]]), "different names").into());
         }
-        let (mut touches, mut robots_of) = (vec![Vec::new(); names.len()], vec![Vec::new(); names.len()]);
+        // For each object its touches by the numbers of their instance and robot.
+        let mut parts = vec![BTreeMap::<(i64, Option<u32>), Vec<Touch>>::new(); names.len()];
         for (row, (times, object)) in times.iter().zip(objects).enumerate() {
             let there = |vectors: Option<&[[f64; 3]]>| {
                 vectors.map(|vectors| vectors[row]).filter(|vector| !vector.iter().all(|cosine| cosine.is_nan()))
@@ -175,16 +177,20 @@ impl DataSet {
             let index = usize::try_from(*object).ok().filter(|object| *object < names.len());
             let index =
                 index.ok_or_else(|| Error::setting("objects", object, format!("0 to {}", names.len().max(1) - 1)))?;
-            touches[index].push((touch?, instances.map_or(0, |instances| instances[row])));
-            if let Some(robots) = robots {
-                let robot = u32::try_from(robots[row]);
-                robots_of[index]
-                    .push(robot.map_err(|_| Error::setting("robots", robots[row], "numbers of 32 bits, from 0"))?);
-            }
+            let number = |robot: i64| {
+                u32::try_from(robot).map_err(|_| Error::setting("robots", robot, "numbers of 32 bits, from 0"))
+            };
+            let robot = robots.map(|robots| number(robots[row])).transpose()?;
+            let instance = instances.map_or(0, |instances| instances[row]);
+            parts[index].entry((instance, robot)).or_default().push(touch?);
         }
         let objects = order.into_iter().map(|index| {
-            let object = ObjectTouches::numbered(&names[index], &touches[index]);
-            if robots.is_some() { object.of_robots(std::mem::take(&mut robots_of[index])) } else { object }
+            let parts = std::mem::take(&mut parts[index]);
+            let first = parts.keys().next().map(|(instance, _)| *instance);
+            let is_one = parts.keys().all(|(instance, _)| Some(*instance) == first);
+            let source = |instance: i64| if is_one { Source::Object } else { Source::Instance(instance.to_string()) };
+            let parts = parts.into_iter().map(|((instance, robot), touches)| (source(instance), robot, touches));
+            ObjectTouches::of_parts(&names[index], parts)
         });
         let objects: Vec<ObjectTouches> = objects.collect();
         if objects.is_empty() || objects.iter().any(|object| object.is_empty()) {
@@ -280,8 +286,12 @@ impl DataSet {
     fn instances<'py>(&self, py: Python<'py>) -> PyResult<Output<'py, i16, Ix1>> {
         let made = self.instances.get_or_try_init(py, || {
             let of = |object: &ObjectTouches| {
-                let number = |touch| i16::try_from(object.source_of(touch)).unwrap_or(i16::MAX);
-                (0..object.len()).map(number).collect::<Vec<i16>>()
+                let sources = object.sources();
+                let number =
+                    |pool: &Pool| sources.iter().position(|source| **source == pool.source).unwrap_or_default();
+                let number = |pool: &Pool| i16::try_from(number(pool)).unwrap_or(i16::MAX);
+                let of = |pool| std::iter::repeat_n(number(pool), pool.range.len());
+                object.pools().iter().flat_map(of).collect::<Vec<i16>>()
             };
             let Output(array) = one(py, self.dataset.objects.iter().flat_map(of).collect());
             array.call_method("setflags", (), Some(&pyo3::types::IntoPyDict::into_py_dict([("write", false)], py)?))?;
@@ -293,9 +303,9 @@ impl DataSet {
     /// Number of the robot that made each touch: all touches of a sequence are from one; `None` if robots do not differ.
     #[getter]
     fn robots<'py>(&self, py: Python<'py>) -> PyResult<Option<Output<'py, i64, Ix1>>> {
-        let of =
-            |object: &ObjectTouches| (0..object.len()).filter_map(|touch| object.robot_of(touch)).collect::<Vec<_>>();
-        let all: Vec<i64> = self.dataset.objects.iter().flat_map(of).map(i64::from).collect();
+        let pools = self.dataset.objects.iter().flat_map(|object| object.pools());
+        let of = |pool: &Pool| pool.robot.map(|robot| std::iter::repeat_n(i64::from(robot), pool.range.len()));
+        let all: Vec<i64> = pools.filter_map(of).flatten().collect();
         if all.len() < self.dataset.len() {
             return Ok(None);
         }

@@ -74,11 +74,10 @@ pub(super) fn large(context: &Context) -> Result<Large> {
     let all = context.settings.limit_touches;
     let touched = context.touch(all, context.settings.seed.wrapping_add(0x11_1117))?;
     let part = |range: std::ops::Range<usize>| {
-        Dataset::new(touched.iter().map(|(object, _)| object.select(range.clone())).collect())
+        Dataset::new(touched.iter().map(|(object, _)| object.part(range.clone(), 100)).collect())
     };
     let [train, held] = PARTS;
-    let (train, held) = (all * train / 100, all * (train + held) / 100);
-    Ok(Large { train: part(0..train), held: part(train..held), test: part(held..all) })
+    Ok(Large { train: part(0..train), held: part(train..train + held), test: part(train + held..100) })
 }
 
 /// Touches of each object of the large capture that are tested on.
@@ -88,7 +87,7 @@ pub(super) fn tested(settings: &Settings) -> usize {
 
 /// The first half of each object's touches.
 fn half(data: &Dataset) -> Dataset {
-    data.each(|object| object.select(0..object.len() / 2))
+    data.each(|object| object.part(0..1, 2))
 }
 
 /// Estimates the limit and tests the first fold's models on the same groups.

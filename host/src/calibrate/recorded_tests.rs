@@ -17,11 +17,9 @@ fn recordings_with_too_many_wrong_names_are_refused_with_the_rate_that_they_supp
     // One recording in five is of another object than its name says.
     let mut wrong = simulated(2_000, 3);
     let others = wrong.objects[1].touches().to_vec();
-    wrong.objects[0] = ObjectTouches::in_runs(
-        "object0",
-        [&wrong.objects[0].touches()[..1_600], &others[..400]].concat(),
-        vec![(session("first"), 1_600), (session("second"), 400)],
-    );
+    let parts = [("first", &wrong.objects[0].touches()[..1_600]), ("second", &others[..400])];
+    let parts = parts.map(|(began, touches)| (session(began), None, touches.to_vec()));
+    wrong.objects[0] = ObjectTouches::of_parts("object0", parts);
     let error = calibrate_recorded(&MODEL.model(), simulated(30_000, 2), &wrong, &settings(0.02), &()).unwrap_err();
     assert!(error.what().starts_with("no threshold that was tested keeps 2 %: at the best "), "{error}");
     assert!(error.what().ends_with(" names given on the recordings are wrong"), "{error}");
@@ -35,11 +33,8 @@ fn session(began: &str) -> Source {
 #[test]
 fn recordings_are_counted_where_a_data_set_lists_them() {
     let of_sessions = simulated(1_200, 3).each(|object| {
-        ObjectTouches::in_runs(
-            object.name.clone(),
-            object.touches().to_vec(),
-            vec![(session("monday"), 600), (session("tuesday"), 600)],
-        )
+        let days = ["monday", "tuesday"].into_iter().zip(object.touches().chunks(600));
+        ObjectTouches::of_parts(&object.name, days.map(|(day, touches)| (session(day), None, touches.to_vec())))
     });
     let calibrated =
         calibrate_recorded(&MODEL.model(), simulated(30_000, 2), &of_sessions, &settings(0.05), &()).unwrap();

@@ -137,28 +137,24 @@ fn samples_are_of_instances_and_placements_in_turn_and_the_data_set_names_them()
     assert!(summary.objects.iter().all(|one| one.touching > 0 && one.touching < one.approaches));
     let listing = Listing::read(directory.path()).unwrap().unwrap();
     let entry = &listing.objects[1];
-    assert_eq!(
-        (entry.name.as_str(), entry.instances.as_slice()),
-        ("stone", &["flat".to_owned(), "long".to_owned()][..])
-    );
-    assert_eq!(entry.placements.len(), scenes.len());
-    for (lying, scene) in entry.placements.iter().zip(&scenes) {
+    assert_eq!((entry.name.as_str(), entry.pools.len(), entry.touches()), ("stone", scenes.len(), 700));
+    for (pool, scene) in entry.pools.iter().zip(&scenes) {
         let table = scene.table().unwrap();
-        assert_eq!(lying.instance.as_deref(), Some(["flat", "long"][table.instance]));
+        assert_eq!(pool.instance.as_deref(), Some(["flat", "long"][table.instance]));
+        let lying = pool.placement.as_ref().unwrap();
         assert_eq!((lying.name.as_str(), lying.weight), (table.placement.as_str(), table.weight));
     }
     let dataset = Dataset::read(directory.path()).unwrap();
     let stone = &dataset.objects[1];
-    assert_eq!(stone.sources(), entry.sources());
-    assert_eq!(stone.sources(), sources(&object, &scenes));
+    assert_eq!(stone.sources(), sources(&object, &scenes).iter().collect::<Vec<_>>());
     assert_eq!(stone.pools().len(), scenes.len(), "no sequence mixes placements");
     let sampler = Sampler::of_instances(&scenes, "stone", &settings.origin);
     for index in [0, 1, 5, 699] {
-        assert_eq!(stone.source_of(index), index % scenes.len());
         let alone = Sampler::new(&scenes[index % scenes.len()], "stone", &settings.origin);
         assert_eq!(sampler.sample(index as u64).unwrap(), alone.sample(index as u64).unwrap());
         // On the disk, poses are rounded to fewer digits than touches in memory have.
-        assert_eq!(stone.touches()[index].times(), sampler.sample(index as u64).unwrap().0.times());
+        let own = stone.of_pool(&stone.pools()[index % scenes.len()])[index / scenes.len()];
+        assert_eq!(own.times(), sampler.sample(index as u64).unwrap().0.times());
     }
     let in_memory = super::in_memory(&[object, disc], &settings, &()).unwrap().0;
     assert_eq!(in_memory, dataset);
@@ -176,15 +172,15 @@ fn parts_and_copies_of_a_data_set_keep_the_placements_and_their_weights() {
     let folds::Split { train, test } = folds::split(&whole, 0.3, 1).unwrap();
     let thinned = whole.each(|object| object.thinned(100));
     let doubled = whole.each(|object| {
-        let mut twice = object.select(0..300);
-        twice.append(&object.select(300..600));
+        let mut twice = object.part(0..1, 2);
+        twice.append(&object.part(1..2, 2));
         twice
     });
     for part in [&noisy, &train, &test, &thinned, &doubled] {
         for (object, own) in whole.objects.iter().zip(&part.objects) {
             assert_eq!(own.placement_weights(), object.placement_weights());
             assert_eq!(own.source_weights(), object.source_weights());
-            assert_eq!(own.placement_of_source(0), object.placement_of_source(0));
+            assert_eq!(own.sources(), object.sources());
         }
     }
     for (number, part) in [&whole, &train, &test].into_iter().enumerate() {
@@ -193,8 +189,7 @@ fn parts_and_copies_of_a_data_set_keep_the_placements_and_their_weights() {
         let read = Dataset::read(&directory).unwrap();
         for (object, own) in part.objects.iter().zip(&read.objects) {
             assert_eq!(own.placement_weights(), object.placement_weights());
-            let counts = |object: &ObjectTouches| object.by_source().iter().map(Vec::len).collect::<Vec<_>>();
-            assert_eq!((own.sources(), counts(own)), (object.sources(), counts(object)));
+            assert_eq!(own.pools(), object.pools());
         }
     }
     let joined = ObjectTouches::joined("background", &whole.objects);
@@ -240,7 +235,7 @@ fn a_capture_of_another_scene_or_other_weights_replaces_none_unless_it_is_forced
     }
     run(origin(50), brick, false).unwrap();
     run(floating, brick, true).unwrap();
-    assert_eq!(Listing::read(directory.path()).unwrap().unwrap().objects[0].placements, []);
+    assert_eq!(Listing::read(directory.path()).unwrap().unwrap().objects[0].pools[0].placement, None);
 }
 
 #[test]

@@ -112,6 +112,7 @@ impl Steps {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::touches::ObjectTouches;
     use crate::touches::Source;
 
     #[test]

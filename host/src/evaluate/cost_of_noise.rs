@@ -41,7 +41,7 @@ pub fn cost_of_noise(dataset: &Dataset, settings: &train::Settings, noise: &Nois
     }
     let split = folds::split(dataset, 0.2, settings.seed)?;
     let [train_part, mut test] = [(&split.train, MOST[0]), (&split.test, MOST[1])]
-        .map(|(part, most)| part.each(|object| object.part(0.0, most as f64 / object.len().max(most) as f64)));
+        .map(|(part, most)| part.each(|object| object.part(0..most, object.len().max(most))));
     let clean = train::Settings { noise: Noise::default(), rounds: settings.rounds.min(ROUNDS), ..settings.clone() };
     let ensemble = train(&train_part, &clean, &())?;
     let accuracy = |test: &Dataset| -> Result<f64> {

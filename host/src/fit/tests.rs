@@ -398,15 +398,13 @@ fn tabled(count: usize, seed: u64, probe: &Crooked, is_stated: bool) -> (Dataset
             let times = touch.times().map(|time| time.micros().map(|micros| f64::from(micros) / 1e3));
             record(times, probe, &mut numbers)
         };
-        let by_source = touched.by_source();
-        let runs = by_source.iter().enumerate().map(|(source, touches)| {
-            let placement = touched.placement_of_source(source).filter(|_| is_stated).map(str::to_owned);
-            let recording =
-                Recorded { object: object.name.clone(), placement, began: source.to_string(), ..Recorded::default() };
-            (Source::Recording(recording), touches.len() as u64)
+        let parts = touched.pools().iter().enumerate().map(|(source, pool)| {
+            let placement = pool.source.placement().filter(|_| is_stated).map(str::to_owned);
+            let recording = Recorded { placement, began: source.to_string(), ..Recorded::default() };
+            let touches = touched.of_pool(pool).iter().map(&mut recorded).collect();
+            (Source::Recording(recording), None, touches)
         });
-        let touches = by_source.iter().flatten().map(|&touch| recorded(&touched.touches()[touch])).collect();
-        ObjectTouches::in_runs(&object.name, touches, runs.collect())
+        ObjectTouches::of_parts(&object.name, parts.collect::<Vec<_>>())
     };
     (Dataset::new(objects()[..2].iter().map(one).collect()), settings)
 }
@@ -425,7 +423,7 @@ fn a_probe_is_fitted_to_objects_that_stand_on_a_table() {
 #[test]
 fn a_recording_in_an_unknown_placement_is_refused() {
     let (recorded, settings) = tabled(60, 12, &BENT, true);
-    let lying = Recorded { object: "bowl".into(), placement: Some("+q".into()), ..Recorded::default() };
+    let lying = Recorded { placement: Some("+q".into()), ..Recorded::default() };
     let unknown = ObjectTouches::new("bowl", recorded.objects[0].touches().to_vec(), Source::Recording(lying));
     let error = fit(&Dataset::new(vec![unknown]), &objects(), None, &settings, &()).unwrap_err();
     assert!(error.to_string().contains("bowl/+q was recorded, but is not among the objects: bowl/"), "{error}");

@@ -161,19 +161,16 @@ fn recorded(dataset: &Dataset, is_stated: bool) -> Dataset {
     let one = |own: &ObjectTouches| {
         let began = |number: usize| format!("2026-11-22T{:02}:00:00Z", 10 + number);
         let recording = |number: usize, placement: Option<String>| {
-            let (object, began) = (own.name.clone(), began(number));
-            Source::Recording(Recorded { object, began, placement, ..Recorded::default() })
+            Source::Recording(Recorded { began: began(number), placement, ..Recorded::default() })
         };
         if !is_stated {
             return ObjectTouches::new(&own.name, own.as_often_as_placed().touches().to_vec(), recording(0, None));
         }
-        let by_source = own.by_source();
-        let touches = by_source.iter().flatten().map(|&touch| own.touches()[touch]).collect();
-        let runs = by_source.iter().enumerate().map(|(source, touches)| {
-            let placement = own.placement_of_source(source).map(str::to_owned);
-            (recording(source, placement), touches.len() as u64)
+        let parts = own.pools().iter().enumerate().map(|(number, pool)| {
+            let placement = pool.source.placement().map(str::to_owned);
+            (recording(number, placement), None, own.of_pool(pool).to_vec())
         });
-        ObjectTouches::in_runs(&own.name, touches, runs.collect())
+        ObjectTouches::of_parts(&own.name, parts)
     };
     let probe = dataset.probe().copied().unwrap_or_default();
     let origin = Origin::recorded(probe, palpate_shared::format::Length::Tenth, true);
@@ -226,7 +223,7 @@ fn a_placement_that_the_model_does_not_know_is_named_with_those_that_it_does() {
     let compiled = compiled(&trained(Outputs::Placements));
     let model = compiled.model();
     let mut tested = recorded(&touched(3, 600), true);
-    let lying = tested.objects[0].sources()[0].clone();
+    let lying = tested.objects[0].pools()[0].source.clone();
     let Source::Recording(lying) = lying else { panic!("{lying:?}") };
     let other = Recorded { placement: Some("+q".into()), ..lying };
     tested.objects[0] = ObjectTouches::new("brick", tested.objects[0].touches().to_vec(), Source::Recording(other));
@@ -299,7 +296,7 @@ fn a_promise_for_a_table_is_tested_on_recordings_with_and_without_placements() {
             Ok(calibrated) => assert!(is_stated && calibrated.objects.keys().all(|name| name.contains('/'))),
         }
         // Too few: the advice is of what was recorded.
-        let few = recorded.each(|own| own.select(0..40));
+        let few = recorded.each(|own| own.part(0..40, own.len()));
         let error = calibrate_recorded(&model, simulated.clone(), &few, &settings, &()).unwrap_err().to_string();
         assert!(
             error.contains(if is_stated { "to brick/" } else { "to brick" }) || error.contains(" to disc"),

@@ -334,13 +334,13 @@ impl ObjectTouches {
         Self::of_parts(&self.name, parts.collect::<Vec<_>>()).of_stroke(self.window)
     }
 
-    /// The touches of each pool from one share of it on up to another.
+    /// Part of the touches of each pool: with `0..2` and `of` 5, the first two fifths.
     #[must_use]
-    pub fn part(&self, from: f64, to: f64) -> Self {
+    pub fn part(&self, part: Range<usize>, of: usize) -> Self {
+        let of = of.max(1);
         self.each_pool(|_, touches| {
-            // Rounded to the nearest touch; `as` saturates.
-            let at = |share: f64| ((touches.len() as f64 * share).round() as usize).min(touches.len());
-            touches[at(from)..at(to).max(at(from))].to_vec()
+            let at = |end: usize| touches.len() * end.min(of) / of;
+            touches[at(part.start.min(part.end))..at(part.end)].to_vec()
         })
     }
 
@@ -434,11 +434,11 @@ mod tests {
         };
         let late = |touch: &Touch| touch.times()[1].micros().unwrap() >= 20;
         let doubled = {
-            let mut twice = object.part(0.0, 0.3);
-            twice.append(&object.part(0.7, 1.0));
+            let mut twice = object.part(0..3, 10);
+            twice.append(&object.part(7..10, 10));
             twice
         };
-        for part in [object.part(0.25, 0.5), object.filtered(late), object.thinned(6), doubled] {
+        for part in [object.part(1..2, 4), object.filtered(late), object.thinned(6), doubled] {
             assert!(!part.is_empty() && is_of_its_source(&part), "{part:?}");
         }
         assert_eq!(lengths(&object.thinned(6)), [2, 2, 2]);
@@ -446,7 +446,7 @@ mod tests {
         assert_eq!(reversed.sources(), object.sources());
         let of_last = object.filtered(|touch| touch.times()[1].micros().unwrap() % 3 == 0);
         assert_eq!(of_last.sources(), [&Source::Instance("cup 2".into())], "others have no touch");
-        assert!(object.part(0.5, 0.5).pools().is_empty());
+        assert!(object.part(1..1, 2).pools().is_empty());
     }
 
     #[test]
@@ -492,7 +492,7 @@ mod tests {
             let found: std::collections::BTreeSet<_> = noisy.pools().iter().map(|pool| pool.robot).collect();
             assert_eq!((found.len(), noisy.has_robots()), (robots, robots > 1));
             // A part of them is of the same robots, and these stay with what is added later.
-            assert_eq!(noisy.part(0.2, 0.6).pools().len(), pools);
+            assert_eq!(noisy.part(1..3, 5).pools().len(), pools);
             let again = noisy.noisy(&noise, 2, 7);
             assert!(again.pools().iter().map(|pool| pool.robot).eq(noisy.pools().iter().map(|pool| pool.robot)));
         }

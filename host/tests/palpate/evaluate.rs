@@ -225,7 +225,7 @@ fn touches_that_a_model_does_not_use_cost_an_approach_and_change_nothing() {
 fn a_dead_finger_ends_undecided_where_a_model_knows_full_touches_only() {
     let model = OF_FULL_TOUCHES.1.model();
     let mut dead = with_missing_contacts(&test_touches(), usize::MAX);
-    dead.objects.iter_mut().for_each(|object| *object = object.select(1..object.len()));
+    dead.objects.iter_mut().for_each(|object| *object = object.part(1..object.len(), object.len()));
     let margins = Margins::new(Candidate::Compiled(&model), &dead).unwrap();
     let evaluation = evaluate(&margins, &with!(quick(), at = Vec::new())).unwrap();
     assert_eq!(evaluation.touches, 0);

@@ -37,7 +37,7 @@ pub(crate) fn assert_rare(what: &str, failures: u64, repetitions: u64, share: f6
 
 /// The touches that `keep` says.
 pub(crate) fn filtered(object: &ObjectTouches, keep: impl Fn(&Touch) -> bool) -> ObjectTouches {
-    object.select((0..object.len()).filter(|&touch| keep(&object.touches()[touch])))
+    object.each_pool(|_, touches| touches.iter().copied().filter(&keep).collect())
 }
 
 /// Touches of an object of one source, each changed.

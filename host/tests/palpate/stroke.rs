@@ -28,7 +28,7 @@ fn lines(dataset: &Dataset) -> Dataset {
 /// Touches as a recording, whose probe states its stroke or none.
 fn recorded(dataset: &Dataset, stroke: Option<f64>) -> Dataset {
     let one = |own: &ObjectTouches| {
-        let source = Source::Recording(Recorded { object: own.name.clone(), ..Recorded::default() });
+        let source = Source::Recording(Recorded::default());
         ObjectTouches::new(&own.name, own.touches().to_vec(), source)
     };
     let probe = with!(Probe::default(), stroke);

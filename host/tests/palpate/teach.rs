@@ -107,7 +107,7 @@ fn what_cannot_be_taught_says_why() {
     refused(ensemble, &first, &recorded, "there are no touches of object1, which the ensemble knows");
     refused(ensemble, &known, &Dataset::default(), "there are no recorded touches");
     let mut few = recorded.clone();
-    few.objects[0] = few.objects[0].select(0..19);
+    few.objects[0] = few.objects[0].part(0..19, few.objects[0].len());
     let too_few = "only 19 recorded touches of object2 are evidence, and at least 20 are needed";
     refused(ensemble, &known, &few, too_few);
     let mut full = recorded.clone();

@@ -18,7 +18,7 @@ use std::path::PathBuf;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
-The directory gets NAME.txt for each object, one line per touch: three contact times in seconds after the first contact, `-` for a finger that never touched; dataset.json says how they were made. The directory appears when all is done; one that holds anything else is refused.
+The directory gets NAME.txt for each object, or NAME/1.txt, NAME/2.txt and so on for each of its instances or placements, one line per touch: three contact times in seconds after the first contact, `-` for a finger that never touched; dataset.json says how they were made. The directory appears when all is done; one that holds anything else is refused.
 
 Examples:
   palpate capture builtin -o data                  21,000 touches per object

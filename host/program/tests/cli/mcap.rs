@@ -113,7 +113,8 @@ fn a_log_is_recorded_into_a_data_set_object_by_object() {
         objects.iter().map(|object| object.touches().iter().map(|touch| touch.times()).collect::<Vec<_>>()).collect()
     };
     assert_eq!(touches(&dataset.objects), touches(&log));
-    assert_eq!(dataset.recorded()[0].source, PYTHON);
+    let palpate::touches::Source::Recording(recorded) = &dataset.objects[0].pools()[0].source else { panic!() };
+    assert_eq!(recorded.source, PYTHON);
     fails(at, &record("bowl"), 1, "the same 20 touches of bowl were recorded before");
     fails(at, &record("spoon"), 1, "json-zstd.mcap: no touch of spoon in this log, only of bowl, mug.");
 }

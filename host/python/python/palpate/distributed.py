@@ -403,9 +403,10 @@ def _put_together(shards: list[_Job], format: Format) -> dict[str, str]:
             table = DataSet.read(directory).to_pandas().astype({"object": str})
         store.write(f"{name}.parquet", table.to_parquet(index=False))
     entry = json.loads(records[0]["entry"])
-    for field_ in ("touches", "approaches"):
-        entry[field_] = sum(json.loads(record["entry"])[field_] for record in records)
-    entry["crc32"] = zlib.crc32(content)
+    entries = [json.loads(record["entry"]) for record in records]
+    entry["approaches"] = sum(part["approaches"] for part in entries)
+    # Each mesh is an object of one instance, and so of one file.
+    entry["pools"] = [{"touches": sum(part["pools"][0]["touches"] for part in entries), "crc32": zlib.crc32(content)}]
     return {**records[0], "entry": json.dumps(entry, ensure_ascii=False)}
 
 
@@ -433,8 +434,9 @@ def train(
     if not listing:
         raise InputError(f"{url}: no data set. Capture it first.")
     names = [entry["name"] for entry in listing["objects"]]
-    weights = {entry["name"]: 1.0 / entry["touches"] for entry in listing["objects"]}
-    mean = sum(entry["touches"] for entry in listing["objects"]) / len(names)
+    counts = {entry["name"]: sum(pool["touches"] for pool in entry["pools"]) for entry in listing["objects"]}
+    weights = {name: 1.0 / count for name, count in counts.items()}
+    mean = sum(counts.values()) / len(names)
     poses = [f"{vector}_{axis}" for vector in ("direction", "alignment") for axis in "xyz"]
     columns = ["t1", "t2", "t3", *(poses if listing["settings"]["pose"] else [])]
     count = len(_features(pd.DataFrame({name: [] for name in columns}), descriptor).columns)

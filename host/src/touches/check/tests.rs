@@ -21,7 +21,8 @@ fn captured() -> tempfile::TempDir {
         let path = directory.path().join(format!("{}.txt", entry.name));
         let text = lines(&touches(index as u32));
         std::fs::write(&path, &text).unwrap();
-        (entry.touches, entry.approaches, entry.crc32) = (30, 90, Some(CRC.checksum(text.as_bytes())));
+        entry.approaches = 90;
+        (entry.pools[0].touches, entry.pools[0].crc32) = (30, Some(CRC.checksum(text.as_bytes())));
     }
     listing.write(directory.path()).unwrap();
     directory
@@ -82,7 +83,7 @@ fn every_wrong_line_is_named_and_more_than_twenty_are_counted() {
 #[test]
 fn what_a_listing_states_must_be_there() {
     let directory = captured();
-    change(directory.path(), |listing| listing.objects[0].touches = 31);
+    change(directory.path(), |listing| listing.objects[0].pools[0].touches = 31);
     wrong(directory.path(), "fork.txt: 30 touches where dataset.json states 31");
     let directory = captured();
     std::fs::remove_file(directory.path().join("spoon.txt")).unwrap();
@@ -104,7 +105,7 @@ fn what_reads_well_and_trains_badly_is_wrong() {
         let directory = captured();
         std::fs::write(directory.path().join("spoon.txt"), lines(spoon)).unwrap();
         match listed {
-            true => change(directory.path(), |listing| listing.objects[1].touches = spoon.len() as u64),
+            true => change(directory.path(), |listing| listing.objects[1].pools[0].touches = spoon.len() as u64),
             false => std::fs::remove_file(Listing::path(directory.path())).unwrap(),
         }
         directory
@@ -156,7 +157,7 @@ fn a_recording_of_one_object_is_no_reason_to_end_with_1() {
     std::fs::remove_file(directory.path().join("spoon.txt")).unwrap();
     change(directory.path(), |listing| {
         listing.objects.retain(|entry| entry.name == "fork");
-        listing.recorded.push(crate::touches::Recorded { object: "fork".into(), touches: 30, ..Default::default() });
+        listing.objects[0].pools[0].recorded = Some(crate::touches::Recorded::default());
     });
     let (wrong, notes) = said(directory.path());
     assert_eq!(wrong, [""; 0]);

@@ -295,7 +295,8 @@ impl Open {
         });
         let entry = &mut objects[number];
         let place = [number, entry.pools.len()];
-        let file = entry.pools.last().map(|_| (entry.pools.len() + 1).to_string());
+        let number = |pool: &PoolFile| pool.file.as_ref().map_or(1, |file| file.parse::<u64>().unwrap_or(0));
+        let file = entry.pools.iter().map(number).max().map(|last| (last + 1).to_string());
         let pool = PoolFile { file, recorded: Some(recorded.clone()), ..PoolFile::default() };
         let path = entry.path(directory, &pool);
         entry.pools.push(pool);

@@ -124,7 +124,7 @@ fn recordings_that_are_too_few_say_which_rate_they_support_and_that_rate_can_be_
         name if name == hard => most,
         _ => all - least - most,
     };
-    let recorded = recorded_as_simulated(most).each(|object| object.select(0..as_much(object)));
+    let recorded = recorded_as_simulated(most).each(|object| object.part(0..as_much(object), object.len()));
     calibrate_recorded(&MODEL.model(), SIMULATED.clone(), &recorded, &settings(0.01), &()).unwrap();
 }
 

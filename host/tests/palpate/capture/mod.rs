@@ -298,8 +298,10 @@ fn touches_of_an_object_are_of_its_instances_in_turn() {
     let disc = objects().remove(0);
     capture(&[two, disc], &with(origin), directory.path(), &()).unwrap();
     let listing = Listing::read(directory.path()).unwrap().unwrap();
-    assert_eq!(listing.objects[1].instances, ["fine", "coarse"]);
-    assert!(listing.objects[0].instances.is_empty());
+    let pools =
+        |object: usize| listing.objects[object].pools.iter().map(|pool| (pool.instance.as_deref(), pool.touches));
+    assert_eq!(pools(1).collect::<Vec<_>>(), [(Some("fine"), 150), (Some("coarse"), 150)]);
+    assert_eq!(pools(0).collect::<Vec<_>>(), [(None, 300)]);
     assert_eq!(Dataset::read(directory.path()).unwrap().len(), 600);
 }
 

@@ -17,7 +17,7 @@ A line is a touch: three contact times in seconds on any clock, - for a finger t
 
 On a table, the object's name may end with its placement, as `palpate capture --scene table` names it; without one, the touches may be of any placement.
 
-The directory gets NAME.txt and dataset.json. All lines are added, or none if one of them is wrong. Touches of an object that is there already are added to it.
+The directory gets NAME.txt and dataset.json; a second recording of the object is NAME/2.txt. All lines are added, or none if one of them is wrong.
 
 Examples:
   palpate data record monday.txt -o recorded --object bowl
