@@ -61,7 +61,7 @@ fn main() -> Result<(), Failed> {
         let names: Vec<&str> = objects[..count].iter().map(|object| object.name.as_str()).collect();
         let part = |from: usize, to: usize| {
             let known = data.objects.iter().filter(|object| names.contains(&object.name.as_str()));
-            let part = |object: &ObjectTouches| object.select(from..to.min(object.len()));
+            let part = |object: &ObjectTouches| object.part(from..to, object.len());
             Dataset { origin: data.origin.clone(), ..Dataset::new(known.map(part).collect()) }
         };
         let train = usize::try_from(approaches)?;
