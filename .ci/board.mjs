@@ -136,7 +136,7 @@ const start = () => {
   return { chip, clock, core, uart };
 };
 
-// The host's end of the link, as the page of `palpate view --port` has it.
+// The host's end of the link, as the page of `palpate watch` has it.
 const openLink = (clock) => {
   const { exports } = new WebAssembly.Instance(new WebAssembly.Module(readFileSync(linkPath)));
   const now = () => clock.nanos / 1000;

@@ -1,4 +1,4 @@
-// Uses a page of `palpate view --play`: plays as a visitor would, and compares what the page computes with what the program computed.
+// Uses a page of `palpate play`: plays as a visitor would, and compares what the page computes with what the program computed.
 const choose = (select, value) => {
   select.value = value;
   select.dispatchEvent(new Event("change"));

@@ -1,4 +1,4 @@
-// Uses a page of `palpate view --port`: stands in for `navigator.serial`, with a visitor for each case. A trial begins before the
+// Uses a page of `palpate watch`: stands in for `navigator.serial`, with a visitor for each case. A trial begins before the
 // page's own scripts. `given.first` and `given.second` hold a chip's bytes in two sessions, `given.shown` what the page showed
 // after each.
 const loaded = new Promise((resume) => addEventListener("load", resume));

@@ -70,7 +70,7 @@
 //! | `strangers` | a test of whether touches fit any object that a model knows | `strangers::calibrate` |
 //! | `teach` | objects that are learned from recorded touches | `teach::teach` |
 //! | [`stream`] | verdicts of streams of rows, as early as a promised error rate allows | [`stream::calibrate`](fn@stream::calibrate) |
-//! | [`play`] | objects touched one approach after the other, and models that follow: the page of `palpate view --play` | [`play::Game`] |
+//! | [`play`] | objects touched one approach after the other, and models that follow: the page of `palpate play` | [`play::Game`] |
 //! | [`locate`] | what an object on a table is and where it lies, for a hand that knows where it is | [`locate::cast`] |
 //! | [`chip`] | talks to a chip, real or emulated | [`chip::Connection`] |
 //!

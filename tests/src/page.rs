@@ -1,4 +1,4 @@
-//! The trace of a page of `palpate view --play`: all that it must compute, computed by the program.
+//! The trace of a page of `palpate play`: all that it must compute, computed by the program.
 
 use palpate::capture::touches;
 use palpate::compile::CompiledModel;

@@ -115,8 +115,8 @@ part_plan() { # approaches at random and planned
     done
     quiet train train -o oriented.json --descriptor oriented --evidence all --trees leaf_bits=8
     quiet export oriented.json -o oriented.palpate --leaf i8
-    quiet calibrate oriented.palpate fresh -o direction.palpate --plan 1
-    quiet calibrate oriented.palpate fresh -o planned.palpate --plan 4
+    quiet plan oriented.palpate fresh -o direction.palpate --rolls 1
+    quiet plan oriented.palpate fresh -o planned.palpate
     row() { # name, model, threshold, how to write the first number, the last command, options of evaluate
         local name=$1 model=$2 rate=$3 bold=$4 command=$5
         shift 5
@@ -134,8 +134,8 @@ PYTHON
     }
     row "at random" oriented.palpate 0.02 "" '`evaluate oriented.palpate unseen --sequences 2000 --error-rate 0.02`'
     random=$(field evaluated.json approaches sequential mean_approaches)
-    row "planned, direction" direction.palpate 0.03 "" '`calibrate … --plan 1`, then `… --active --error-rate 0.03`' --active
-    row "planned, direction and roll" planned.palpate 0.03 '**' '`calibrate … --plan 4`, then `… --active --error-rate 0.03`' --active
+    row "planned, direction" direction.palpate 0.03 "" '`plan … --rolls 1`, then `… --active --error-rate 0.03`' --active
+    row "planned, direction and roll" planned.palpate 0.03 '**' '`plan …`, then `… --active --error-rate 0.03`' --active
     planned=$(field evaluated.json approaches sequential mean_approaches)
     stated docs/guide/first-model.md "$(printf '%.1f approaches instead of %.1f' "$planned" "$random")"
 }
@@ -145,7 +145,7 @@ part_strangers() { # bytes that a misfit test takes
     quiet train touches -o ensemble.json --real noise=0..5ms,timer=1ms
     quiet export ensemble.json -o model.palpate
     quiet capture builtin -o again --approaches 60000 --seed 3 --force
-    quiet calibrate model.palpate again -o strict.palpate --strangers likely --real noise=0..5ms,timer=1ms
+    quiet calibrate model.palpate again -o strict.palpate --detect-unknown --real noise=0..5ms,timer=1ms
     quiet calibrate model.palpate again -o sure.palpate --real noise=0..5ms,timer=1ms
     local bytes
     bytes=$((($(wc -c <strict.palpate) - $(wc -c <sure.palpate) + 5) / 10))

@@ -83,10 +83,10 @@ def main():
                 run("export", directory / "model.json", "-o", directory / "model.palpate", *position)
                 options = [*columns, "--error-rate", "10%", *(["--guard"] if guard else [])]
                 sure = directory / "sure.palpate"
-                if run("calibrate", directory / "model.palpate", directory / "calibrate.csv", "-o", sure, *options) is None:
+                if run("rows", "calibrate", directory / "model.palpate", directory / "calibrate.csv", "-o", sure, *options) is None:
                     refused += 1
                     continue
-                found.append(run("evaluate", sure, directory / "test.csv", *columns))
+                found.append(run("rows", "evaluate", sure, directory / "test.csv", *columns))
                 if not guard:
                     continue
                 good = [good[0] + found[-1]["refused"], good[1] + sum(len(all_rows[i]) for i in test)]
@@ -96,7 +96,7 @@ def main():
                     for sequence in broken:
                         sequence[1:, 0] = {"missing": np.nan, "rail": top, "stuck": sequence[0, 0]}[kind]
                     write(directory / "broken.csv", broken, y[test], test)
-                    ends = run("evaluate", sure, directory / "broken.csv", *columns)
+                    ends = run("rows", "evaluate", sure, directory / "broken.csv", *columns)
                     rows_after = sum(len(sequence) - 1 for sequence in broken)
                     bad[kind] = [bad[kind][0] + ends["refused"], bad[kind][1] + rows_after]
             share = lambda pair: f"{pair[0] / pair[1]:.2%}" if pair[1] else "–"  # noqa: E731

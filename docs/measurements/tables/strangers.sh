@@ -23,15 +23,15 @@ quiet train trained -o plain.json
 quiet train trained -o background.json --background shapes
 for model in plain background; do
     quiet export $model.json -o $model.palpate
-    for test in off likely; do
-        quiet calibrate $model.palpate fresh -o $model-$test.palpate --strangers $test --sequences 50000
-        "$palpate" evaluate $model-$test.palpate tested --unknown others --json --quiet >evaluated.json
-        python3 - $model $test "$(wc -c <$model-$test.palpate)" <<'PYTHON'
+    for test in "" --detect-unknown; do
+        quiet calibrate $model.palpate fresh -o $model$test.palpate $test --sequences 50000
+        "$palpate" evaluate $model$test.palpate tested --unknown others --json --quiet >evaluated.json
+        python3 - $model "$test" "$(wc -c <$model$test.palpate)" <<'PYTHON'
 import json, sys
 
 found = json.load(open("evaluated.json"))
 known, unknown = found["sequential"], found["strangers"]
-method = {"plain": "", "background": "background"}[sys.argv[1]], {"off": "", "likely": "misfit test"}[sys.argv[2]]
+method = {"plain": "", "background": "background"}[sys.argv[1]], "misfit test" if sys.argv[2] else ""
 percent = lambda share: f"{100 * share:.1f} %"
 cells = [" and ".join(filter(None, method)) or "neither", f"{int(sys.argv[3]):,}", f"{known['mean_touches']:.1f}", percent(known["unknown"]),
          percent(unknown["wrong_name"]), percent(unknown["detected"]["120"])]

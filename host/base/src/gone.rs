@@ -1,7 +1,7 @@
 //! Commands, options, values and kinds of files that earlier versions had, with what to use instead.
 
-/// One line for each word that went, as a user writes it: a command, an option, an option with a value, or the ending of a
-/// file name.
+/// One line for each word that went, as a user writes it: a command, an option (behind its command, if others still have it), an
+/// option with a value, or the ending of a file name.
 const GONE: &[(&str, &str)] = &[
     ("tune", "train with --preset small or --preset tiny, or loop over settings in Python (docs/guide/small.md)"),
     ("probe design", "compare probes with a loop in Python (docs/guide/real-probe.md)"),
@@ -24,14 +24,25 @@ const GONE: &[(&str, &str)] = &[
     ("--false-per-hour", "rates per hour went with --events; begin again after each verdict (docs/guide/streams.md)"),
     ("--hold-off", "begin again after each verdict (docs/guide/streams.md)"),
     ("--grace", "begin again after each verdict (docs/guide/streams.md)"),
-    ("--strangers certain", "use --strangers likely"),
+    ("--strangers", "use --detect-unknown"),
+    ("--placement-prior", "use --per object: the rate then holds in each placement"),
+    ("calibrate --label", "use palpate rows calibrate"),
+    ("calibrate --guard", "use palpate rows calibrate"),
+    ("calibrate --objects", "use palpate maps calibrate"),
+    ("calibrate --plan", "use palpate plan"),
+    ("evaluate --label", "use palpate rows evaluate"),
+    ("evaluate --objects", "use palpate maps evaluate"),
+    ("recognize --features", "use palpate rows recognize"),
+    ("recognize --add-up", "use palpate rows recognize"),
+    ("recognize --active", "use --next"),
+    ("recognize --explore", "use palpate maps explore"),
+    ("link --active", "use --next"),
+    ("view --play", "use palpate play, or palpate maps play for a table"),
+    ("view --port", "use palpate watch"),
     ("--varied", "capture objects of your own with --instances"),
     ("--picture", "draw objects with palpate view"),
     ("--trace", "Palpate's own tests compare the page with the program"),
-    (
-        "--watch",
-        "palpate link PORT prints a line for each touch of the chip's own fingers; palpate view --port shows a page",
-    ),
+    ("--watch", "palpate link PORT prints a line for each touch of the chip's own fingers; palpate watch makes a page"),
     ("--journal", "write the output of palpate link PORT to a file"),
     ("--against", "check a chip with --parity and --load"),
     ("--per-object", "check a chip with --parity and --load"),
@@ -41,10 +52,10 @@ const GONE: &[(&str, &str)] = &[
     ("--mhz", "divide the number of instructions by the clock rate"),
     ("--config", "state the settings as options"),
     ("--confusion", "palpate report draws the confusion of objects"),
-    ("--recorded", "evaluate a model on the recording: palpate evaluate MODEL RECORDED"),
-    ("--position", "make maps of meshes with palpate maps train, without touches"),
+    ("report --recorded", "evaluate a model on the recording: palpate evaluate MODEL RECORDED"),
+    ("capture --position", "make maps of meshes with palpate maps train, without touches"),
     ("--within", "make maps of meshes with palpate maps train, without touches"),
-    ("--maps", "make maps with palpate maps train, which takes --maps"),
+    ("train --maps", "make maps with palpate maps train, which takes --maps"),
     (".parquet", "write text or CSV, for instance with pandas"),
     (".pcd", "make a mesh of the points first (docs/guide/scenes.md)"),
     (".xyz", "make a mesh of the points first (docs/guide/scenes.md)"),
@@ -52,7 +63,7 @@ const GONE: &[(&str, &str)] = &[
     ("depth image", "make a mesh of the depth images first (docs/guide/scenes.md)"),
 ];
 
-/// Advice for a word that was removed: a command (`probe design`), an option (`--layout`), an option with a value
+/// Advice for a word that was removed: a command (`probe design`), an option (`--layout`, `view --play`), an option with a value
 /// (`--emit thumb`), or the ending of a file name (`.pcd`). `None` for any other word.
 pub fn instead(word: &str) -> Option<&'static str> {
     GONE.iter().find(|(gone, _)| *gone == word).map(|(_, instead)| *instead)

@@ -7,7 +7,7 @@ putty, each time where `palpate.Shape` proposes. After 50, 100, 200 and 300 appr
     env/bin/pip install mujoco==4.0.0 trimesh==5.2.0 ./host/python
     python shape_in_mujoco.py meshes/mouse.obj -o mouse.txt
 
-writes the touches as `palpate view`, `palpate data objects` and `palpate train --teach` read them. Options of robot_in_mujoco.py for
+writes the touches as `palpate maps view`, `palpate data objects` and `palpate train --teach` read them. Options of robot_in_mujoco.py for
 the hand, its fingers and switches are taken, too.
 """
 

@@ -77,7 +77,7 @@ pub(crate) fn estimate_sequences(
     Ok((Model::of(found.model)?, text))
 }
 
-/// Sets a model's thresholds on sequences of rows, and returns the model and what `palpate calibrate --json` prints.
+/// Sets a model's thresholds on sequences of rows, and returns the model and what `palpate rows calibrate --json` prints.
 #[pyo3::pyfunction]
 #[pyo3(signature = (model, rows, labels, sequence, *, groups=None, error_rate=0.01, per="average", confidence=0.95,
     max_rows=None, strangers=None, background=None, background_sequence=None, guard=false, learned=None,
@@ -131,7 +131,7 @@ pub(crate) fn calibrate(
     Ok((Model::of(calibrated.model)?, text))
 }
 
-/// Measures a model on sequences of rows, and returns what `palpate evaluate --json` prints.
+/// Measures a model on sequences of rows, and returns what `palpate rows evaluate --json` prints.
 #[pyo3::pyfunction]
 #[pyo3(signature = (model, rows, labels, sequence, *, groups=None, error_rate=None, max_rows=None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]

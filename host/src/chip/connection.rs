@@ -384,7 +384,7 @@ const OTHER_VERSION: &str = "Flash the chip again: its program speaks another ve
 /// The error for a line that carries touches, and a model over rows.
 pub fn no_rows() -> Error {
     problem!("the model is over rows of features, and the line to a chip carries touches").fix(
-        "Recognize rows here with `palpate recognize MODEL ROWS.csv --features`; on the chip the program itself \
+        "Recognize rows here with `palpate rows recognize MODEL ROWS.csv`; on the chip the program itself \
          passes them to push_features, and its verdicts are the same.",
     )
 }

@@ -6,7 +6,7 @@ use palpate_onboard::CapacityError;
 /// The problem of touches for a model over rows of features.
 pub fn raw_features() -> Error {
     problem!("the model works on rows of features, not on touches")
-        .fix("Give it rows of features: `palpate help recognize` and `palpate help evaluate` say how.")
+        .fix("Give it rows of features, as the commands of `palpate rows` do.")
 }
 
 /// The problem of rows of features for a model over touches.

@@ -1,6 +1,6 @@
 //! A game: objects that are touched one approach after the other, and models that follow, side by side, on the same touches.
 //!
-//! The page of `palpate view --play` plays it, with these lines compiled to WebAssembly (`host/web`). Approach k of a round is
+//! The page of `palpate play` plays it, with these lines compiled to WebAssembly (`host/web`). Approach k of a round is
 //! sample k of a capture with the round's seed: what is touched on the page can be captured again by the program.
 //!
 //! ```

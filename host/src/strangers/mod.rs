@@ -12,7 +12,7 @@
 //! no kind, each weighted by how nearly the object leads it. B + C/n is taken at n = 40 for all n, so that one matrix for
 //! each object does; measured, that detects as many strangers as the exact ratio.
 //!
-//! `calibrate --strangers` says how many known objects a test calls unknown, and `evaluate --unknown` how many strangers it detects.
+//! `calibrate --detect-unknown` says how many known objects a test calls unknown, and `evaluate --unknown` how many strangers it detects.
 
 mod fixed;
 mod follow;

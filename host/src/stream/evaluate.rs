@@ -34,7 +34,7 @@ pub struct Wanted {
     pub weights: Option<Vec<u32>>,
 }
 
-/// Results on sequences of rows; as JSON, `palpate evaluate --json`.
+/// Results on sequences of rows; as JSON, `palpate rows evaluate --json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Evaluated {
     /// Sequences.

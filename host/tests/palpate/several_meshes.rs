@@ -117,7 +117,7 @@ fn promised<T>(calibrated: Result<T>) -> Option<T> {
     calibrated.map_err(|error| assert!(matches!(error.kind(), Kind::NotKept | Kind::TooFew), "{error}")).ok()
 }
 
-/// Promises of `calibrate` and of `calibrate --strangers`, repeated: `PALPATE_REPETITIONS=40 cargo test --release -p palpate --test
+/// Promises of `calibrate` and of `calibrate --detect-unknown`, repeated: `PALPATE_REPETITIONS=40 cargo test --release -p palpate --test
 /// palpate several_meshes::promises -- --nocapture` says how many were broken.
 #[test]
 fn promises_are_kept_where_objects_have_several_meshes() {
@@ -183,7 +183,7 @@ fn what_calibrations_count_is_what_fresh_touches_give() {
     let tested = strangers::calibrate(&model, &touches(12_000, 4), &[], &settings).unwrap();
     let sequences = f64::from(tested.terms.sequences);
     let stated = Share::of(tested.alarms as f64 / sequences, sequences);
-    stated.agrees("calibrate --strangers, false alarms", Share::of(ends(&tested.bytes)[0], 1_000.0));
+    stated.agrees("calibrate --detect-unknown, false alarms", Share::of(ends(&tested.bytes)[0], 1_000.0));
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! The game of `palpate view --play` as WebAssembly: functions that a page's script calls, and nothing that they import.
+//! The game of `palpate play` as WebAssembly: functions that a page's script calls, and nothing that they import.
 //!
 //! Numbers come as arguments. Bytes come through [`input`], which says where in memory the script may write them. Numbers
 //! go out through [`output`] (f64) and [`evidence`] (i64), whose memory holds until the next call. A function that can

@@ -2,7 +2,7 @@
 //! `.ci/pages/play.js` compares each of the 10,000 approaches with the page's own.
 //!
 //! ```text
-//! palpate view --play --model MODEL -o game.html
+//! palpate play --model MODEL -o game.html
 //! cargo run --release -p palpate-tests --bin page -- MODEL >trace.txt
 //! ```
 

@@ -13,17 +13,6 @@ pub(crate) struct ExpectedArguments {
     only: Vec<String>,
 }
 
-impl ExpectedArguments {
-    /// The first option that is given.
-    pub(crate) fn given(&self) -> Option<&'static str> {
-        match (self.prior.prior.is_empty(), self.only.is_empty()) {
-            (false, _) => Some("prior"),
-            (_, false) => Some("only"),
-            _ => None,
-        }
-    }
-}
-
 /// Frequencies with which objects are touched.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub(crate) struct PriorArguments {
@@ -70,7 +59,7 @@ impl PriorArguments {
 
 impl ExpectedArguments {
     /// True if anything else is expected than the model states.
-    pub(crate) fn is_given(&self) -> bool {
+    fn is_given(&self) -> bool {
         !self.prior.prior.is_empty() || !self.only.is_empty()
     }
 

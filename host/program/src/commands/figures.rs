@@ -253,7 +253,7 @@ fn strangers_table(strangers: &OnStrangers) -> String {
         let named = strangers.wrong_name_per_object.iter().map(|(name, share)| format!("{name} {}", percent(*share)));
         return format!(
             "\nObjects that the model does not know: {} got a name, {} no verdict. The model has no test of whether touches \
-             fit an object that it knows, so it never says that one is unknown: palpate calibrate --strangers likely adds one. \
+             fit an object that it knows, so it never says that one is unknown: palpate calibrate --detect-unknown adds one. \
              Got a name: {}.\n{}",
             percent(strangers.wrong_name),
             percent(strangers.undecided),

@@ -2,20 +2,18 @@
 
 use super::Global;
 use super::numbers::count;
-use super::probe::{IN_MILLIMETERS, SizeArguments, refuse_unstated};
+use super::probe::{SizeArguments, refuse_unstated};
 use super::progress::Bar;
-use super::recognize_lines::{Event, each_of};
 use super::scene::SceneArguments;
 use palpate::ensemble::StatedProbe;
 use palpate::fit::{Fit, GrazingEstimate, NOT_TOLD, Settings, between, fit, offset, offset_between};
-use palpate::locate::{BareTable, Measured, REACH, bare_table};
 use palpate::output;
 use palpate::touches::{Origin, read_touches};
 use palpate::with;
 use palpate::{Error, Result};
 use palpate_shared::format::Length;
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 #[derive(clap::Args)]
 #[command(arg_required_else_help = true, subcommand_required = true)]
@@ -36,8 +34,6 @@ RECORDED is a data set that your probe made, of objects whose meshes you have, m
 
 A few hundred approaches to three or four objects are enough. Presses on a flat plate, with half a turn of the probe after each, determine offsets better than any object, and nothing else: one line per press, in a file for --plate.
 
-Without SOURCE, RECORDED is a file of presses on the bare table by a hand that states its position: 20 of them beside the object, straight down, with half a turn of the hand after each. The height of the table and the offsets of the outer fingertips are printed, and the probe is written with them. It needs --probe in millimeters.
-
 With --scene table the objects stood on a table and were approached from above; the table itself is a plate. Recordings that state their placement (`palpate data record --object bowl/+z`) determine more.
 
 Examples:
@@ -45,20 +41,19 @@ Examples:
   palpate probe fit recorded meshes/ -o probe.toml --plate plate.txt
   palpate probe fit recorded meshes/ -o fitted.toml --probe probe.toml \\
       --true-size mm
-  palpate probe fit presses.txt -o fitted.toml --probe hand.toml
   palpate probe fit recorded meshes/ -o probe.toml --scene table")]
 struct FitArguments {
-    /// The recorded touches: a directory with a file for each object; or, without SOURCE, a file of presses on a bare table
+    /// The recorded touches: a directory with a file for each object
     #[arg(value_name = "RECORDED")]
     recorded: PathBuf,
     /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), directories of them
-    #[arg(value_name = "SOURCE")]
+    #[arg(value_name = "SOURCE", required = true)]
     sources: Vec<String>,
     /// Output; the probe, such as probe.toml
     #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
     /// Presses on a flat plate, half a turn of the probe after each, one line per press
-    #[arg(long, value_name = "FILE", requires = "sources")]
+    #[arg(long, value_name = "FILE")]
     plate: Option<PathBuf>,
     /// Approaches to each object; simulated
     #[arg(long, value_name = "N", value_parser = count, default_value_t = Settings::default().approaches)]
@@ -77,9 +72,6 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
 fn run_fit(arguments: &FitArguments, global: &Global) -> Result<()> {
     let inputs = super::files_of(&arguments.recorded).into_iter().chain(arguments.plate.clone());
     output::admit(&arguments.output, inputs)?;
-    if arguments.sources.is_empty() {
-        return fit_bare(arguments, global);
-    }
     let recorded = super::checked(palpate::touches::Dataset::read_any(&arguments.recorded)?);
     let base = recorded.origin.clone().unwrap_or_default();
     if recorded.origin.as_ref().is_none_or(|origin| origin.probe == Origin::default().probe) {
@@ -111,55 +103,6 @@ fn run_fit(arguments: &FitArguments, global: &Global) -> Result<()> {
         true => Ok(()),
         false => output::print_about(&arguments.output, &format!("Wrote {}\n", arguments.output.display())),
     }
-}
-
-/// Measures the table and the fingertips by presses on the bare table.
-fn fit_bare(arguments: &FitArguments, global: &Global) -> Result<()> {
-    let path = &arguments.recorded;
-    if path.is_dir() {
-        let allowed = "objects, or instead of the directory a file of presses on the bare table";
-        return Err(Error::setting("SOURCE", "not given", allowed));
-    }
-    let file = arguments.size.probe.read()?.filter(|file| file.unit == Length::Millimeter);
-    let probe = file.ok_or_else(|| Error::setting("probe", "not in millimeters", IN_MILLIMETERS))?.probe;
-    let mut presses = Vec::new();
-    each_of(path, &mut |event| {
-        if let Event::Touch { touch, place } = event {
-            presses.push((place, *touch));
-        }
-        Ok(())
-    })?;
-    let found = bare_table(&presses, &probe).map_err(|error| error.in_file(path))?;
-    output::write_bytes(&arguments.output, found.toml(&probe).as_bytes())?;
-    global.print_about(&arguments.output, &found, || bare_text(&found, &arguments.output))
-}
-
-fn bare_text(found: &BareTable, path: &Path) -> String {
-    let BareTable { presses, contacts, lost, left_out, height, tips: [first, third], rise, noise } = found;
-    let mut text = format!(
-        "{presses} presses on a bare table: {contacts} contacts with it, {lost} missing, {left_out} left out\n\n\
-         {:28}{:>9}  standard error\n",
-        "", "mm"
-    );
-    let above = format!("table's rise over {REACH} mm");
-    for (name, Measured { value, error }) in [
-        ("table's height", height),
-        ("first fingertip stands out", first),
-        ("third fingertip stands out", third),
-        (above.as_str(), rise),
-    ] {
-        // Writing to a string cannot fail.
-        _ = writeln!(text, "{name:28}{value:9.2}  {error:.2}");
-    }
-    _ = write!(
-        text,
-        "{:28}{noise:9.2}\n\nSubtract the table's height from z, and a fingertip's offset from the heights that it meets.\n",
-        "scatter of a contact"
-    );
-    if found.is_slanted() {
-        text += "The table is not level: it raises objects on one side.\n";
-    }
-    text + &format!("Wrote {}\n", path.display())
 }
 
 /// Estimates, one line for each number.

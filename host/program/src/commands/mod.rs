@@ -12,6 +12,7 @@ mod figures;
 mod fit;
 mod inspect;
 mod keys;
+mod kinds;
 mod link;
 mod maps;
 mod numbers;
@@ -24,13 +25,10 @@ mod prove;
 mod real;
 mod recognize;
 mod recognize_lines;
-mod recognize_maps;
-mod recognize_rows;
 mod report;
 mod rows;
 mod run;
 mod scene;
-mod sequences;
 mod shape;
 mod shell;
 mod strangers;
@@ -42,6 +40,7 @@ mod trees;
 mod unstated;
 mod verify;
 mod view;
+mod watch;
 
 use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -77,26 +76,34 @@ commands! {
     Capture => capture,
     /// Train an ensemble on captured touches
     Train => train,
-    /// Make height maps of objects on a table
-    Maps => maps,
     /// Compile an ensemble to the bytes that the chip reads
     Export => export,
-    /// Set thresholds that keep an error rate, or plan approaches
+    /// Set thresholds that keep an error rate
     Calibrate => calibrate,
+    /// Add a plan of approaches to a model
+    Plan => plan,
     /// Measure how often a model is right, and after how many touches
     Evaluate => evaluate,
     /// Compare a compiled model with what it was exported from
     Verify => verify,
     /// Recognize objects from a stream of touches
     Recognize => recognize,
+    /// Calibrate, evaluate and recognize on rows of features
+    Rows => rows,
+    /// Find objects on a table: train, calibrate, recognize, ...
+    Maps => maps,
     /// Say what is in a compiled model, and what it costs on a chip
     Inspect => inspect,
     /// Remake the whole evaluation, with every figure
     Report => report,
-    /// Recognize on a chip at the end of a line, or watch it
+    /// Recognize on a chip at the end of a line
     Link => link,
-    /// Show an object or a chip on a page, or touch objects there
+    /// Make a page that shows a chip at a serial port
+    Watch => watch,
+    /// Show an object on a page
     View => view,
+    /// Make a page on which objects are touched and recognized
+    Play => play,
     /// Check and record data sets of touches; write built-in objects
     Data => data,
     /// Measure how your probe differs from the ideal
@@ -205,12 +212,13 @@ fn remark(text: &str) {
 }
 
 /// The commands as the program's help lists them.
-const GROUPS: [(&str, &[&str]); 5] = [
+const GROUPS: [(&str, &[&str]); 6] = [
     ("Everything at once", &["run", "report"]),
-    ("Step by step", &["capture", "train", "maps train", "export", "calibrate", "evaluate", "recognize"]),
-    ("A real probe", &["probe fit", "data record", "data check", "link"]),
-    ("Models from elsewhere", &["export", "verify"]),
-    ("Look", &["inspect", "view", "data objects"]),
+    ("Step by step", &["capture", "train", "export", "calibrate", "plan", "evaluate", "recognize"]),
+    ("A real probe", &["probe fit", "data record", "data check", "link", "watch"]),
+    ("Objects on a table", &["maps"]),
+    ("Models from elsewhere", &["export", "verify", "rows"]),
+    ("Look", &["inspect", "view", "play", "data objects"]),
 ];
 
 /// The command of this path, such as `data check`.
@@ -370,7 +378,7 @@ fn with_instead(mut error: clap::Error, words: &[String]) -> clap::Error {
         _ => None,
     };
     let argument = text(ContextKind::InvalidArg);
-    let gone = match (argument, text(ContextKind::InvalidValue), text(ContextKind::InvalidSubcommand)) {
+    let mut gone = match (argument, text(ContextKind::InvalidValue), text(ContextKind::InvalidSubcommand)) {
         (Some(option), Some(value), _) => format!("{option} {value}"),
         (Some(option), ..) if option.starts_with('-') => option.into(),
         (Some(_), ..) if words.starts_with(&["data".into(), "check".into()]) => "data check A B".into(),
@@ -380,6 +388,11 @@ fn with_instead(mut error: clap::Error, words: &[String]) -> clap::Error {
         }
         _ => return error,
     };
+    // An option that another command still has.
+    let command = words.iter().find(|word| !word.starts_with('-')).map_or("", String::as_str);
+    if palpate::gone::instead(&format!("{command} {gone}")).is_some() {
+        gone = format!("{command} {gone}");
+    }
     if let Some(instead) = palpate::gone::instead(&gone) {
         let advice = format!("`{gone}` was removed: {instead}").into();
         error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![advice]));
@@ -396,7 +409,7 @@ fn message(error: &Error, command: &str) -> String {
     let Kind::Setting { name, value, .. } = error.kind() else {
         return error.to_string();
     };
-    let option = option_of(name).replace('_', "-");
+    let option = option_of(name, command).replace('_', "-");
     let cli = cli();
     // The command's own options, those of the commands below it, and the global ones.
     let named = cli.find_subcommand(command).into_iter();
@@ -410,14 +423,13 @@ fn message(error: &Error, command: &str) -> String {
     error.to_string()
 }
 
-/// The option of a setting that the library calls otherwise.
-fn option_of(setting: &str) -> &str {
-    match setting {
-        "groups" => "sequences",
-        "max_rows" => "max_touches",
-        "rolls" => "plan",
-        "scales" => "scale",
-        other => other,
+/// The option of `command` for a setting that the library calls otherwise.
+fn option_of<'s>(setting: &'s str, command: &str) -> &'s str {
+    match (setting, command) {
+        ("groups", _) => "sequences",
+        ("max_touches", "rows") => "max_rows",
+        ("scales", _) => "scale",
+        (other, _) => other,
     }
 }
 
@@ -550,10 +562,14 @@ mod tests {
     }
 
     #[test]
-    fn the_groups_of_help_name_every_command_that_is_listed() {
-        let shown: BTreeSet<String> =
-            GROUPS.iter().flat_map(|(_, paths)| paths.iter().map(ToString::to_string)).collect();
-        assert_eq!(shown, listed().into_iter().map(|(path, _)| path).collect());
+    fn the_groups_of_help_name_every_command_that_is_listed_or_the_one_that_holds_it() {
+        let shown: BTreeSet<&str> = GROUPS.iter().flat_map(|(_, paths)| paths.iter().copied()).collect();
+        let listed: Vec<String> = listed().into_iter().map(|(path, _)| path).collect();
+        let is_shown = |path: &String| {
+            shown.contains(path.as_str()) || path.split_once(' ').is_some_and(|(above, _)| shown.contains(above))
+        };
+        assert!(listed.iter().all(is_shown), "{listed:?}");
+        assert!(shown.iter().all(|path| at(&cli(), path).is_some()));
         let overview = overview(&Cli::command());
         assert!(overview.lines().all(|line| line.chars().count() <= 80), "{overview}");
     }

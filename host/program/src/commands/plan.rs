@@ -1,18 +1,18 @@
-//! `palpate calibrate --plan`.
+//! `palpate plan`.
 
 use super::Global;
+use super::kinds::{self, ModelKind};
 use super::probe::ProbeArguments;
 use super::progress::Bar;
 use super::real::RealArguments;
 use palpate::Result;
-use palpate::compile::CompiledModel;
 use palpate::evaluate::{self, Planned};
 use palpate::output;
 use palpate::probe::noise::Noise;
 use palpate::progress::Progress;
 use palpate::wording::{count, counted, decimal};
 use palpate_shared::DIRECTIONS;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 #[derive(serde::Serialize)]
 struct Written {
@@ -21,33 +21,46 @@ struct Written {
     planned: Planned,
 }
 
-/// A plan to be made.
-pub(super) struct Wanted<'a> {
-    /// The model that gets it.
-    pub(super) model: &'a PathBuf,
-    /// Approaches with pose.
-    pub(super) directory: &'a Path,
-    pub(super) output: &'a Path,
-    /// The number of rolls of the row of fingers for each direction.
-    pub(super) rolls: u8,
-    pub(super) probe: &'a ProbeArguments,
-    pub(super) real: &'a RealArguments,
+/// Add a plan to a model: which pose to approach in next.
+#[derive(clap::Args)]
+#[command(after_help = "\
+DIR holds approaches with their pose to all of the model's objects, which the model was not trained on: 20 of each object in every pose, about 10,000 in all with four rolls. A plan takes one byte for each pose and pair of objects. docs/guide/plan.md has more.
+
+Examples:
+  palpate capture builtin -o posed --approaches 60000 --pose --seed 2
+  palpate plan model.palpate posed -o planned.palpate
+  palpate plan model.palpate posed -o planned.palpate --rolls 1")]
+pub(crate) struct Arguments {
+    /// Compiled model
+    model: PathBuf,
+    /// Approaches with pose: a directory that `palpate capture` filled
+    #[arg(value_name = "DIR")]
+    directory: PathBuf,
+    /// Output; the model with its plan
+    #[arg(short, long, value_name = "PATH")]
+    output: PathBuf,
+    /// Rolls of the row of fingers for each direction: 1, 2 or 4
+    #[arg(long, value_name = "N", default_value = "4")]
+    rolls: u8,
+    #[command(flatten)]
+    probe: ProbeArguments,
+    #[command(flatten)]
+    real: RealArguments,
 }
 
-/// Adds a plan to a model.
-pub(super) fn run(wanted: &Wanted<'_>, global: &Global) -> Result<()> {
-    let Wanted { directory, output: path, .. } = *wanted;
+pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
+    let Arguments { model, directory, output: path, rolls, probe, real } = &arguments;
     let inputs = super::files_of(directory);
-    output::admit(path, inputs.iter().chain([wanted.model]))?;
-    let compiled = CompiledModel::read(wanted.model)?;
+    output::admit(path, inputs.iter().chain([model]))?;
+    let compiled = kinds::compiled(model, ModelKind::Touches, "plan")?;
     let mut dataset = super::dataset(directory)?.matching(&compiled.names());
-    let file = wanted.probe.read()?;
-    wanted.probe.of_dataset(file.as_ref(), &dataset)?;
-    let noise = wanted.real.over(wanted.probe.noise(file.as_ref(), &dataset, Noise::default())?)?;
+    let file = probe.read()?;
+    probe.of_dataset(file.as_ref(), &dataset)?;
+    let noise = real.over(probe.noise(file.as_ref(), &dataset, Noise::default())?)?;
     evaluate::add_noise(&mut dataset, &noise, global.seed())?;
     let progress = Bar::new();
     progress.begin("planning", None);
-    let planned = evaluate::plan(&compiled.model(), &dataset, wanted.rolls).map_err(|error| match error {
+    let planned = evaluate::plan(&compiled.model(), &dataset, *rolls).map_err(|error| match error {
         error if error.exit_code() == 1 => error.in_file(directory),
         _ => error,
     })?;

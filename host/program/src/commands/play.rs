@@ -1,40 +1,48 @@
-//! `palpate view --play`.
+//! `palpate play`.
 
+use super::kinds::{self, ModelKind};
 use super::probe::{SizeArguments, refuse_unstated};
-use super::progress::Bar;
 use super::real::RealArguments;
-use super::scene::SceneArguments;
 use super::{Global, shell};
-use palpate::compile::CompiledModel;
 use palpate::ensemble::StatedProbe;
-use palpate::locate::Real;
 use palpate::mesh::builtin;
 use palpate::output;
 use palpate::probe::Probe;
 use palpate::probe::noise::Noise;
 use palpate::touches::Origin;
-use palpate::with;
 use palpate::{Error, Result};
 use palpate_report::play::{self, Contender, Settings};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-/// A page to be made on which objects are touched.
-pub(super) struct Wanted {
-    pub(super) sources: Vec<String>,
-    /// Compiled models; that of the built-in objects if there are none.
-    pub(super) model: Vec<PathBuf>,
-    pub(super) output: PathBuf,
-    pub(super) size: SizeArguments,
-    pub(super) real: RealArguments,
+/// Make a page on which objects are touched, and models recognize them.
+#[derive(clap::Args)]
+#[command(after_help = "\
+The page works in any browser, without a network. Without --model it has a model of the built-in objects, which the program has. Touches are disturbed as by a usual switch that is polled every millisecond, unless --real or the probe file says otherwise.
+
+Examples:
+  palpate play -o play.html                     ten objects
+  palpate play meshes/ --model out/model.palpate -o play.html
+                                                your meshes and model")]
+pub(crate) struct Arguments {
+    /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), directories of them
+    #[arg(value_name = "SOURCE", default_value = "builtin")]
+    sources: Vec<String>,
+    /// Output; the page
+    #[arg(short, long, value_name = "PATH")]
+    output: PathBuf,
+    /// A compiled model of the objects; may be given several times
+    #[arg(long, value_name = "FILE")]
+    model: Vec<PathBuf>,
+    #[command(flatten)]
+    size: SizeArguments,
+    #[command(flatten)]
+    real: RealArguments,
 }
 
-pub(super) fn run(wanted: Wanted, global: &Global) -> Result<()> {
-    let Wanted { mut sources, model, output, size, real } = wanted;
+pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
+    let Arguments { sources, output, model, size, real } = arguments;
     let seed = global.seed();
-    if sources.is_empty() {
-        sources.push("builtin".into());
-    }
-    output::admit(&output, model.iter().chain(sources.iter().map(PathBuf::from).collect::<Vec<_>>().iter()))?;
+    output::admit(&output, model.iter().cloned().chain(sources.iter().map(PathBuf::from)))?;
     let file = size.probe.read()?;
     let origin = size.origin(Origin { seed, ..Origin::default() })?;
     refuse_unstated(&size)?;
@@ -51,62 +59,18 @@ pub(super) fn run(wanted: Wanted, global: &Global) -> Result<()> {
         }
         contenders.push(Contender::household()?);
     }
-    let models = model.iter().flat_map(|path| ["--model".into(), path.to_string_lossy().into_owned()]);
-    let own: Vec<String> = models.chain(size.words()).chain(real.words()).collect();
-    let command = shell::command(
-        ["palpate", "view", "--play"]
-            .into_iter()
-            .chain(sources.iter().map(String::as_str))
-            .chain(["-o", &output.to_string_lossy(), "--seed", &seed.to_string()])
-            .chain(own.iter().map(String::as_str)),
-    );
-    let settings = Settings { origin, noise, command };
-    let page = play::page(&objects, &contenders, &settings)?;
+    let page = play::page(&objects, &contenders, &Settings { origin, noise, command: shell::typed() })?;
     output::write_bytes(&output, page.as_bytes())?;
     let text = || format!("{}: open it in a browser\n", output.display());
     global.print_about(&output, &serde_json::json!({ "page": output }), text)
 }
 
 /// A model for approaches of this origin.
-fn contender(path: &PathBuf, origin: &Origin) -> Result<Contender> {
-    let model = CompiledModel::read(path)?;
+fn contender(path: &Path, origin: &Origin) -> Result<Contender> {
+    let model = kinds::compiled(path, ModelKind::Touches, "play")?;
     if let Some(stated) = model.model().probe() {
         let own = StatedProbe::from(origin).trained();
         StatedProbe::compare([&path.display().to_string(), "the page"], [stated, own])?;
     }
     Contender::new(model).map_err(|error| error.in_file(path))
-}
-
-/// Makes the page of a table.
-pub(super) fn on_table(wanted: Wanted, scene: &SceneArguments, global: &Global) -> Result<()> {
-    let Wanted { mut sources, model, output, mut size, real } = wanted;
-    scene.check_straight_down()?;
-    if !model.is_empty() {
-        return Err(Error::setting("model", "given", "it without --scene table: the page's maps are made for it"));
-    }
-    let seed = global.seed();
-    if sources.is_empty() {
-        sources.push("builtin".into());
-    }
-    output::admit(&output, sources.iter().map(PathBuf::from).collect::<Vec<_>>().iter())?;
-    let words = [size.words(), scene.words(), real.words()].concat();
-    size.units.imply_unit();
-    // The guide's hand, unless a file states another.
-    let probe = with!(Probe::default(), radius = 1.5, spacing = 15.0, speed = 100.0, tilt = 0.0, stroke = Some(20.0));
-    let origin = size.origin(Origin { seed, probe, ..Origin::default() })?;
-    let mut objects = size.objects(&sources, seed)?;
-    if !(2..=play::MOST_OBJECTS).contains(&objects.len()) {
-        let allowed = format!("2 to {} objects with --scene table", play::MOST_OBJECTS);
-        return Err(Error::setting("number of objects", objects.len(), allowed));
-    }
-    scene.weigh(&mut objects)?;
-    let stated = size.probe.read()?.map(|file| file.real).filter(|real| !real.is_none());
-    let noise = real.on_table(stated.unwrap_or_else(|| Real::default().noise(origin.probe.speed)))?;
-    let command = ["palpate", "view", "--play"].into_iter().chain(sources.iter().map(String::as_str));
-    let output_words = ["-o", &output.to_string_lossy(), "--seed", &seed.to_string()].map(str::to_owned);
-    let command = shell::command(command.chain(output_words.iter().chain(&words).map(String::as_str)));
-    let page = play::table(&objects, &Settings { origin, noise, command }, &Bar::new())?;
-    output::write_bytes(&output, page.as_bytes())?;
-    let text = || format!("{}: open it in a browser\n", output.display());
-    global.print_about(&output, &serde_json::json!({ "page": output }), text)
 }

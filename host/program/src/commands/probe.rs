@@ -17,7 +17,6 @@ use palpate::with;
 use palpate::{Error, Result};
 use palpate_shared::format::Length;
 use std::cell::OnceCell;
-use std::fmt;
 use std::path::PathBuf;
 
 /// The probe.
@@ -56,13 +55,6 @@ impl ProbeArguments {
             None => ProbeFile::read(path)?,
         };
         Ok(Some(*self.contents.get_or_init(|| file)))
-    }
-
-    /// The option as words of a command line, to repeat it.
-    pub(crate) fn words(&self) -> Vec<String> {
-        let words =
-            self.path().into_iter().flat_map(|path| ["--probe".to_owned(), path.to_string_lossy().into_owned()]);
-        words.collect()
     }
 
     /// The probe that a model of this data set states: that of the data set, or, where it states none, that of the file.
@@ -244,21 +236,6 @@ impl UnitArguments {
     pub(crate) fn is_true_size(&self) -> bool {
         !self.true_size.is_empty()
     }
-
-    /// The options as words of a command line, to repeat them.
-    pub(crate) fn words(&self) -> Vec<String> {
-        let mut words = Vec::new();
-        if self.is_true_size() {
-            let units: Vec<String> = self.true_size.iter().map(ToString::to_string).collect();
-            words.extend(["--true-size".to_owned(), units.join(",")]);
-        }
-        if let Some(count) = self.instances {
-            words.push("--instances".to_owned());
-            words.extend((count > 0).then(|| count.to_string()));
-        }
-        words.extend(self.skip_bad.then(|| "--skip-bad".to_owned()));
-        words
-    }
 }
 
 impl SizeArguments {
@@ -316,11 +293,6 @@ impl SizeArguments {
     pub(crate) fn lacks_probe(&self) -> bool {
         self.units.is_true_size() && self.probe.path().is_none()
     }
-
-    /// The options as words of a command line, to repeat them.
-    pub(crate) fn words(&self) -> Vec<String> {
-        [self.probe.words(), self.units.words()].concat()
-    }
 }
 
 /// Source of a probe for objects at their true size.
@@ -361,18 +333,6 @@ enum MeshUnit {
     Unstated(f64),
     /// Unit of the object of this name, regardless of its mesh, in millimeters.
     Of(String, f64),
-}
-
-impl fmt::Display for MeshUnit {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let unit =
-            |millimeters: &f64| UNITS.into_iter().find(|(_, own)| own == millimeters).map_or("mm", |(unit, _)| unit);
-        match self {
-            Self::Stated => f.write_str("stated"),
-            Self::Unstated(millimeters) => f.write_str(unit(millimeters)),
-            Self::Of(name, millimeters) => write!(f, "{name}={}", unit(millimeters)),
-        }
-    }
 }
 
 fn mesh_unit(text: &str) -> Result<MeshUnit, String> {

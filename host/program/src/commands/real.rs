@@ -16,14 +16,7 @@ pub(crate) struct RealArguments {
 }
 
 #[derive(Clone, Debug)]
-struct Real {
-    /// Original text, to repeat it in messages.
-    text: String,
-    given: Given,
-}
-
-#[derive(Clone, Debug)]
-enum Given {
+enum Real {
     Settings(PartialNoise),
     File(PathBuf),
 }
@@ -46,14 +39,14 @@ impl RealArguments {
     /// # Errors
     /// If its probe file cannot be read; for fingers that bend aside.
     pub(crate) fn on_table(&self, base: Noise) -> Result<Noise> {
-        let noise = match self.real.as_ref().map(|real| &real.given) {
+        let noise = match &self.real {
             None => base,
-            Some(Given::Settings(settings)) => settings.over(base),
-            Some(Given::File(path)) => ProbeFile::read(path)?.real,
+            Some(Real::Settings(settings)) => settings.over(base),
+            Some(Real::File(path)) => ProbeFile::read(path)?.real,
         };
-        match self.real.as_ref().map(|real| &real.given) {
+        match &self.real {
             _ if noise.grazing.is_none() => Ok(noise),
-            Some(Given::File(path)) => Err(only_captured().at(Place::file(path))),
+            Some(Real::File(path)) => Err(only_captured().at(Place::file(path))),
             _ => Err(only_captured()),
         }
     }
@@ -62,22 +55,16 @@ impl RealArguments {
     pub(crate) fn is_given(&self) -> bool {
         self.real.is_some()
     }
-
-    /// The option as words of a command line, to repeat it.
-    pub(crate) fn words(&self) -> Vec<String> {
-        self.real.iter().flat_map(|real| ["--real".to_owned(), real.text.clone()]).collect()
-    }
 }
 
 /// A probe file by its name, or settings; what is wrong with them, with what to write.
 fn real(text: &str) -> Result<Real, String> {
     let path = Path::new(text);
     let is_file = path.extension().is_some_and(|extension| extension == "toml") || path.is_file();
-    let given = match is_file {
-        true => Given::File(path.into()),
-        false => Given::Settings(text.parse().map_err(wrong)?),
-    };
-    Ok(Real { text: text.into(), given })
+    match is_file {
+        true => Ok(Real::File(path.into())),
+        false => text.parse().map(Real::Settings).map_err(wrong),
+    }
 }
 
 /// A problem with the settings, with the key that may have been meant.
@@ -112,11 +99,10 @@ mod tests {
     }
 
     #[test]
-    fn settings_stand_for_noise_and_are_repeated_as_words() {
+    fn settings_stand_for_noise() {
         let given = parsed(&["--real", "noise=0..10ms,missed=2%"]);
         let noise = given.over(Noise::switch()).unwrap();
         assert_eq!((noise.deviation.largest, noise.timer, noise.missed), (10_000.0, 1_000.0, [0.02; 3]));
-        assert_eq!(given.words(), ["--real", "noise=0..10ms,missed=2%"]);
         assert!(given.is_given() && !parsed(&[]).is_given() && parsed(&["--real", "none"]).is_given());
         assert_eq!(parsed(&[]).over(Noise::switch()).unwrap(), Noise::switch());
         assert!(parsed(&["--real", "none"]).over(Noise::switch()).unwrap().is_none());

@@ -46,7 +46,6 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let seed = global.seed();
     refuse_stdout(&output)?;
     let parts: Vec<Part> = Part::ALL.into_iter().filter(|part| only.is_empty() || only.contains(part)).collect();
-    let command = command(&sources, seed, quick, &only, &[size.words(), given.words()].concat());
     let settings = if quick { Settings::quick(sources, seed) } else { Settings::full(sources, seed) };
     refuse_unstated(&size)?;
     let capture = size.origin(Origin::default())?;
@@ -58,7 +57,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         None => settings.noise,
     };
     noise.check()?;
-    let settings = Settings { command, parts, noise, capture, ..settings };
+    let settings = Settings { command: shell::typed(), parts, noise, capture, ..settings };
     let objects = || size.touchable(size.objects(&settings.sources, seed)?, &settings.capture);
     let written = palpate_report::report(&objects, &settings, &output, global.force, &Bar::new())?;
     if global.json {
@@ -73,34 +72,4 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
 fn part() -> impl clap::builder::TypedValueParser<Value = Part> {
     let names = clap::builder::PossibleValuesParser::new(Part::ALL.map(Part::name));
     names.try_map(|name| Part::ALL.into_iter().find(|part| part.name() == name).ok_or("not a section"))
-}
-
-/// The command that makes this report again, wherever it is written.
-fn command(sources: &[String], seed: u64, quick: bool, only: &[Part], more: &[String]) -> String {
-    let seed = seed.to_string();
-    let words = ["palpate", "report"].into_iter().chain(sources.iter().map(String::as_str)).chain(["--seed", &seed]);
-    let only: Vec<&str> = only.iter().map(|part| part.name()).collect();
-    let only = (!only.is_empty()).then(|| ["--only".to_owned(), only.join(",")]);
-    let words = words.chain(quick.then_some("--quick")).chain(only.iter().flatten().map(String::as_str));
-    shell::command(words.chain(more.iter().map(String::as_str)))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_command_of_a_report_makes_it_again() {
-        assert_eq!(command(&["builtin".into()], 1, false, &[], &[]), "palpate report builtin --seed 1");
-        assert_eq!(
-            command(
-                &["my meshes".into(), "cup.obj".into()],
-                2,
-                true,
-                &[Part::Noise, Part::Limit],
-                &["--real".into(), "noise=0ms..5ms".into()]
-            ),
-            "palpate report 'my meshes' cup.obj --seed 2 --quick --only noise,limit --real noise=0ms..5ms"
-        );
-    }
 }

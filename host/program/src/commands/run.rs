@@ -68,14 +68,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         capture: origin.into(),
         approaches,
         replace: global.force,
-        command: shell::command(
-            ["palpate", "run"]
-                .into_iter()
-                .chain(sources.iter().map(String::as_str))
-                .chain(["-o", &out.to_string_lossy(), "--touches", &touches.to_string()])
-                .chain(["--approaches", &approaches.to_string(), "--seed", &seed.to_string()])
-                .chain(size.words().iter().chain(&real.words()).map(String::as_str)),
-        ),
+        command: shell::typed(),
         noise: real
             .over(stated.filter(|real| !real.is_none()).unwrap_or_else(Noise::switch))
             .map_err(|error| size.probe.named(error))?,

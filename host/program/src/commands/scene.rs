@@ -14,6 +14,13 @@ pub(crate) struct SceneArguments {
     /// Table: most degrees off vertical [default: 60]
     #[arg(long, value_name = "DEGREES")]
     cone: Option<f64>,
+    #[command(flatten)]
+    weights: PlacementArguments,
+}
+
+/// The placements of objects on a table, and how frequent they are.
+#[derive(clap::Args, Clone, Debug, Default)]
+pub(crate) struct PlacementArguments {
     /// Weights of placements, such as mug/+z=3; the rest of the object's are left out
     #[arg(long, value_name = "WEIGHTS", value_delimiter = ',', value_parser = weight)]
     placements: Vec<Weight>,
@@ -36,7 +43,7 @@ impl SceneArguments {
         const TABLE: &str = "it with --scene table";
         let scene = match (self.scene.unwrap_or(base), self.cone) {
             (Surroundings::Floating, Some(cone)) => return Err(Error::setting("cone", cone, TABLE)),
-            (Surroundings::Floating, None) if !self.placements.is_empty() => {
+            (Surroundings::Floating, None) if !self.weights.placements.is_empty() => {
                 return Err(Error::setting("placements", "given", TABLE));
             }
             (Surroundings::Floating, None) => Surroundings::Floating,
@@ -48,23 +55,16 @@ impl SceneArguments {
         Ok(scene)
     }
 
-    /// Refuses a cone of approaches, where all of them come straight down.
-    pub(crate) fn check_straight_down(&self) -> Result<()> {
-        match self.cone {
-            Some(cone) => Err(Error::setting("cone", cone, "it with touches that are not straight down")),
-            None => Ok(()),
-        }
+    /// Gives objects the weights of their placements.
+    ///
+    /// # Errors
+    /// The ones of [`PlacementArguments::weigh`].
+    pub(crate) fn weigh(&self, objects: &mut [Object]) -> Result<()> {
+        self.weights.weigh(objects)
     }
+}
 
-    /// The options as words of a command line, to repeat them.
-    pub(crate) fn words(&self) -> Vec<String> {
-        let weights =
-            self.placements.iter().map(|Weight { object, placement, weight }| format!("{object}/{placement}={weight}"));
-        let weights: Vec<String> = weights.collect();
-        let placements = (!weights.is_empty()).then(|| ["--placements".into(), weights.join(",")]);
-        ["--scene".into(), "table".into()].into_iter().chain(placements.into_iter().flatten()).collect()
-    }
-
+impl PlacementArguments {
     /// Gives objects the weights of their placements.
     ///
     /// # Errors
@@ -153,7 +153,8 @@ mod tests {
         let cone = SceneArguments { cone: Some(45.0), ..SceneArguments::default() };
         assert!(cone.scene(Surroundings::Floating).is_err());
         assert_eq!(cone.scene(table).unwrap(), Surroundings::Table { cone: 45.0 });
-        let placed = SceneArguments { placements: vec![weight("mug/+z=1").unwrap()], ..SceneArguments::default() };
+        let weights = PlacementArguments { placements: vec![weight("mug/+z=1").unwrap()] };
+        let placed = SceneArguments { weights, ..SceneArguments::default() };
         assert!(placed.scene(Surroundings::Floating).is_err());
         assert_eq!(placed.scene(table).unwrap(), table);
         let on_table = SceneArguments { scene: scene("table").ok(), ..SceneArguments::default() };
@@ -166,9 +167,8 @@ mod tests {
     #[test]
     fn weights_of_unknown_objects_and_two_weights_of_one_placement_are_refused() {
         let mut objects = [Object::new("mug", Mesh::globe(6))];
-        let arguments = |texts: &[&str]| SceneArguments {
+        let arguments = |texts: &[&str]| PlacementArguments {
             placements: texts.iter().map(|text| weight(text).unwrap()).collect(),
-            ..SceneArguments::default()
         };
         assert!(arguments(&["cup/+z=1"]).weigh(&mut objects).unwrap_err().to_string().contains("mug"));
         assert!(arguments(&["mug/+z=1", "mug/+z=2"]).weigh(&mut objects).is_err());

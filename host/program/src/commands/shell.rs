@@ -1,8 +1,14 @@
 //! Commands as a shell reads them.
 
+/// The command that the user typed, for pages to state: `palpate` and its arguments.
+pub(crate) fn typed() -> String {
+    let words = std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned());
+    command(std::iter::once("palpate".to_owned()).chain(words))
+}
+
 /// The words as one line of a POSIX shell: words with special characters are quoted.
-pub(crate) fn command<'a>(words: impl IntoIterator<Item = &'a str>) -> String {
-    words.into_iter().map(quoted).collect::<Vec<_>>().join(" ")
+fn command(words: impl IntoIterator<Item = impl AsRef<str>>) -> String {
+    words.into_iter().map(|word| quoted(word.as_ref())).collect::<Vec<_>>().join(" ")
 }
 
 fn quoted(word: &str) -> String {

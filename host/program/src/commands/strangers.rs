@@ -11,21 +11,18 @@ use std::path::PathBuf;
 /// Test for objects that the model does not know.
 #[derive(clap::Args, Clone, Debug)]
 pub(crate) struct StrangersArguments {
-    /// Detect objects that the model does not know: off or likely [default: off]
-    #[arg(long, value_parser = wanted, value_name = "HOW")]
-    strangers: Option<Wanted>,
-    /// Touches of many other shapes; or rows [default: of 200 shapes, captured as DIR was]
-    #[arg(long, value_name = "DIR", requires = "strangers")]
+    /// Make a test for objects that the model does not know
+    #[arg(long)]
+    detect_unknown: bool,
+    /// Touches of many other shapes; or rows [default: of 200 shapes, captured as DIR was; of rows none]
+    #[arg(long, value_name = "DIR", requires = "detect_unknown")]
     background: Option<PathBuf>,
 }
-
-#[derive(Clone, Copy, Debug)]
-struct Wanted(bool);
 
 impl StrangersArguments {
     /// True if a test is wanted.
     pub(crate) fn is_wanted(&self) -> bool {
-        self.strangers.is_some_and(|Wanted(is_wanted)| is_wanted)
+        self.detect_unknown
     }
 
     /// The data of others, if it is given.
@@ -56,12 +53,4 @@ pub(crate) fn text(found: &Found) -> String {
         found.mean_touches,
         found.mean_touches_without,
     )
-}
-
-fn wanted(name: &str) -> Result<Wanted, String> {
-    match name {
-        "off" => Ok(Wanted(false)),
-        "likely" => Ok(Wanted(true)),
-        _ => Err("use one of off, likely".to_owned()),
-    }
 }

@@ -107,7 +107,7 @@ fn wrong_arguments_are_refused_by_name_and_nothing_is_left_behind() {
         (capture, "--scene moon", 2, "use one of floating, table"),
         (capture, "--scene table --placements globe/+q=1", 1, "globe has no placement +q: it has "),
         (capture, "--scene table --placements globe", 2, "such as mug/+z=3"),
-        (capture, "--position", 2, "`--position` was removed: make maps of meshes with palpate maps train"),
+        (capture, "--position", 2, "`capture --position` was removed: make maps of meshes with palpate maps train"),
     ] {
         fails(at, &format!("{command} {more}"), code, expected);
         assert!(!at.join("out/globe.txt").exists(), "{more}");

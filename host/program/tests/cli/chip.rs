@@ -72,12 +72,11 @@ fn touches_with_a_position_and_a_chip_without_maps_do_not_go_together() {
     for (chip, words, code, expected) in [
         (chip(), "located.txt --load trees.palpate", 1, of_trees),
         (chip_with_table(), "located.txt --load trees.palpate", 1, of_trees),
-        (chip(), "free.txt --load trees.palpate --next", 2, "--next is given. Use it with a model of maps"),
         (
-            chip_with_table(),
-            "located.txt --load maps.palpate --active",
+            chip(),
+            "free.txt --load trees.palpate --next --workspace 9",
             2,
-            "--active is given. Use it with a model of trees",
+            "--workspace is given. Use it with a model of maps",
         ),
         (chip(), "--load maps.palpate", 1, "the chip refuses the model: "),
         (chip_with_table(), "nan.txt --load maps.palpate", 1, "nan.txt:1: "),

@@ -147,7 +147,7 @@ pub(crate) static PLANNED: Fixture = Fixture::new(|at| {
     }
     succeeds(at, "train train -o ensemble.json --descriptor oriented --evidence all --trees rounds=8");
     succeeds(at, "export ensemble.json -o model.palpate");
-    succeeds(at, "calibrate model.palpate fresh -o planned.palpate --plan 1");
+    succeeds(at, "plan model.palpate fresh -o planned.palpate --rolls 1");
 });
 
 /// A box with these sides in millimeters, as an OBJ file.

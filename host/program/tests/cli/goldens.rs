@@ -90,7 +90,7 @@ fn calibration_and_evaluation_on_touches_stay() {
         "export oriented.json -o oriented.palpate",
         "capture bowl fork hammer winebottle -o fresh-all --approaches 3000 --pose --seed 2",
         "calibrate oriented.palpate fresh-all -o all.palpate --sequences 5000 --error-rate 5% --real noise=1ms --json",
-        "calibrate oriented.palpate fresh-all -o planned.palpate --plan 1 --json",
+        "plan oriented.palpate fresh-all -o planned.palpate --rolls 1 --json",
         "calibrate planned.palpate fresh-all -o active.palpate --active --sequences 5000 --error-rate 10% --json",
         "evaluate all.palpate fresh-all --sequences 100 --json",
         "evaluate active.palpate fresh-all --sequences 100 --active --json",
@@ -157,16 +157,20 @@ fn calibration_and_evaluation_on_rows_stay() {
     let columns = "--label kind --sequence-column id";
     script.step("export rows.json -o rows.palpate --json");
     for line in [
-        format!("calibrate rows.palpate calibration.csv {columns} -o average.palpate --error-rate 10% --json"),
-        format!("calibrate rows.palpate calibration.csv {columns} -o name.palpate --error-rate 20% --per name --json"),
-        format!("calibrate rows.palpate calibration.csv {columns} -o object.palpate --error-rate 20% --per object"),
+        format!("rows calibrate rows.palpate calibration.csv {columns} -o average.palpate --error-rate 10% --json"),
         format!(
-            "calibrate rows.palpate calibration.csv {columns} --group-column person -o groups.palpate --error-rate 10% --json"
+            "rows calibrate rows.palpate calibration.csv {columns} -o name.palpate --error-rate 20% --per name --json"
         ),
-        format!("evaluate average.palpate unseen.csv {columns} --json"),
-        format!("evaluate name.palpate unseen.csv {columns}"),
-        format!("evaluate groups.palpate unseen.csv {columns} --group-column person --json"),
-        "evaluate rows.palpate unseen.csv --label kind --json".to_owned(),
+        format!(
+            "rows calibrate rows.palpate calibration.csv {columns} -o object.palpate --error-rate 20% --per object"
+        ),
+        format!(
+            "rows calibrate rows.palpate calibration.csv {columns} --group-column person -o groups.palpate --error-rate 10% --json"
+        ),
+        format!("rows evaluate average.palpate unseen.csv {columns} --json"),
+        format!("rows evaluate name.palpate unseen.csv {columns}"),
+        format!("rows evaluate groups.palpate unseen.csv {columns} --group-column person --json"),
+        "rows evaluate rows.palpate unseen.csv --label kind --json".to_owned(),
     ] {
         script.step(&line);
     }

@@ -7,9 +7,23 @@ use std::process::Stdio;
 fn commands() -> Vec<String> {
     let help = help(&["--help"], 100);
     let list = help.lines().take_while(|line| *line != "Global options:").filter(|line| line.starts_with("  "));
-    let names: std::collections::BTreeSet<String> =
-        list.map(|line| line.trim_start().split("  ").next().unwrap().to_owned()).collect();
+    let mut names: std::collections::BTreeSet<String> = list.map(first).collect();
+    for above in names.clone() {
+        names.extend(below(&above).into_iter().map(|name| format!("{above} {name}")));
+    }
     names.into_iter().collect()
+}
+
+/// What stands before two blanks.
+fn first(line: &str) -> String {
+    line.trim_start().split("  ").next().unwrap().to_owned()
+}
+
+/// The commands below one, as its help lists them.
+fn below(command: &str) -> Vec<String> {
+    let help = help(&command.split(' ').chain(["--help"]).collect::<Vec<_>>(), 100);
+    let list = help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
+    list.map(first).filter(|name| name != "help").collect()
 }
 
 fn help(arguments: &[&str], columns: usize) -> String {
@@ -28,6 +42,17 @@ fn every_command_prints_its_usage_and_options_within_the_columns_of_the_terminal
         }
     }
     assert!(help(&["capture", "--help"], 80).contains("Examples:\n  palpate capture builtin -o data"));
+}
+
+#[test]
+fn the_help_of_every_command_fits_a_screen() {
+    for command in commands().into_iter().chain([String::new()]) {
+        let text = help(&command.split_whitespace().chain(["--help"]).collect::<Vec<_>>(), 100);
+        // These are the same for every command.
+        let global = text.lines().skip_while(|line| *line != "Global options:").take_while(|line| !line.is_empty());
+        let lines = text.lines().count() - global.count();
+        assert!(lines <= 50, "{command}: {lines} lines");
+    }
 }
 
 #[test]
@@ -61,7 +86,19 @@ fn what_was_removed_is_refused_with_what_to_use_instead() {
         "evaluate a b --config c",
         "calibrate a b --events 0",
         "calibrate a b --rows-per-second 9",
-        "calibrate a b --strangers certain",
+        "calibrate a b --strangers likely",
+        "calibrate a b --placement-prior any",
+        "calibrate a b --label kind",
+        "calibrate a b --plan 4",
+        "calibrate a --objects meshes",
+        "evaluate a b --label kind",
+        "evaluate a --objects meshes",
+        "recognize a b --features",
+        "recognize a b --active",
+        "recognize a --explore",
+        "link a --active",
+        "view --play -o a",
+        "view --port -o a",
         "capture builtin --position",
         "capture builtin --within 30",
         "train a --maps cell=2mm",
@@ -117,8 +154,15 @@ fn ctrl_c_leaves_nothing_of_a_capture() {
 fn help_lists_commands_in_groups_of_what_one_wants_to_do() {
     for arguments in [&["help"][..], &["--help"]] {
         let text = help(arguments, 80);
-        let places = ["Everything at once:", "Step by step:", "A real probe:", "Models from elsewhere:", "Look:"]
-            .map(|title| text.find(title).unwrap_or_else(|| panic!("{title}\n{text}")));
+        let places = [
+            "Everything at once:",
+            "Step by step:",
+            "A real probe:",
+            "Objects on a table:",
+            "Models from elsewhere:",
+            "Look:",
+        ]
+        .map(|title| text.find(title).unwrap_or_else(|| panic!("{title}\n{text}")));
         assert!(places.is_sorted(), "{text}");
     }
 }

@@ -9,7 +9,7 @@ use std::path::Path;
 /// The lines that a stream of touches gives.
 pub(crate) fn recognized(at: &Path, words: &str, text: &str) -> Vec<Value> {
     fs::write(at.join("lines.txt"), text).unwrap();
-    lines(&succeeds(at, &format!("recognize {words} lines.txt")))
+    lines(&succeeds(at, &format!("maps recognize {words} lines.txt")))
 }
 
 #[test]
@@ -34,7 +34,7 @@ fn objects_are_located_with_maps_from_meshes_to_a_promise() {
     assert!(inspected["promise"].is_null() && inspected["approach"]["ram"].as_u64().unwrap() > 100_000);
     says(at, "inspect maps.palpate", &["brick/", "noise of 5 ms, 2 % of contacts missed", "unknown test   none"]);
 
-    let words = "calibrate maps.palpate --objects meshes --true-size mm --error-rate 40% --sequences 20";
+    let words = "maps calibrate maps.palpate meshes --true-size mm --error-rate 40% --sequences 20";
     let said = succeeds(at, &format!("{words} -o sure.palpate"));
     assert!(said.contains("It holds for chosen approaches, for noise of 5 ms, 2 % of contacts missed"), "{said}");
     assert!(!said.contains("Until the place is sure"), "{said}");
@@ -53,7 +53,7 @@ fn objects_are_located_with_maps_from_meshes_to_a_promise() {
         let promise = &figures(at, &format!("inspect {model}.palpate"))["promise"];
         assert_eq!((promise["aimed"].as_str(), promise["error_rate"].as_f64()), (Some(aimed), Some(0.4)));
     }
-    let evaluate = "evaluate sure.palpate --objects meshes --true-size mm --sequences 20";
+    let evaluate = "maps evaluate sure.palpate meshes --true-size mm --sequences 20";
     let evaluated = figures(at, evaluate);
     assert!(evaluated["given"].as_u64().unwrap() > 13, "{evaluated}");
     assert_eq!((evaluated["aimed"].as_str(), evaluated["promise"]["aimed"].as_str()), (Some("chosen"), Some("chosen")));
@@ -82,14 +82,14 @@ fn each_touch_gives_a_verdict_a_place_and_the_next_approach_until_an_object_is_n
     }
     let only = recognized(at, "maps.palpate --next --only slab", &touches[0]);
     assert_eq!(only[0]["object"], "slab");
-    let plain = succeeds(at, "recognize maps.palpate lines.txt --json");
+    let plain = succeeds(at, "maps recognize maps.palpate lines.txt --json");
     assert!(plain.contains("\"verdict\":") && !plain.contains("\"pose\":"), "{plain}");
 }
 
 #[test]
 fn on_an_empty_table_it_is_said_that_nothing_but_the_table_was_met() {
     let at = &LOCATED.folder();
-    let calibrate = "calibrate maps.palpate --objects meshes --true-size mm --error-rate 40% --sequences 20";
+    let calibrate = "maps calibrate maps.palpate meshes --true-size mm --error-rate 40% --sequences 20";
     let said = succeeds(at, &format!("{calibrate} --detect-unknown -o sure.palpate"));
     assert!(said.contains("with each object left out in turn: "), "{said}");
     says(at, "inspect sure.palpate", &["unknown below ", "unknown test   from the eighth approach on"]);
@@ -103,7 +103,7 @@ fn on_an_empty_table_it_is_said_that_nothing_but_the_table_was_met() {
     let end = said.iter().find(|line| line["verdict"] != "undecided").unwrap();
     assert!(["unknown", "gave-up"].map(Value::from).contains(&end["verdict"]) && end["table_alone"] == true, "{end}");
     assert!(said[0].get("table_alone").is_none());
-    says(at, "recognize sure.palpate lines.txt", &["  nothing but the table was met\n"]);
+    says(at, "maps recognize sure.palpate lines.txt", &["  nothing but the table was met\n"]);
     // A finger that met something else once.
     let met = format!("0 0.1 0.1 0 0 -1 1 0 0 29 29 10\n{presses}");
     let said = recognized(at, "sure.palpate --next", &met);
@@ -128,7 +128,7 @@ fn maps_and_trees_are_refused_where_the_other_is_needed_with_what_to_do() {
     for (words, code, expected) in [
         ("train data -o x.json", 1, "data: touches with a position … palpate maps train --teach"),
         ("train free --teach data -o x.json", 1, ": touches with a position … palpate maps train --teach"),
-        ("train free -o x.palpate --maps cell=2mm", 2, "`--maps` was removed: make maps with palpate maps train"),
+        ("train free -o x.palpate --maps cell=2mm", 2, "`train --maps` was removed: make maps with palpate maps train"),
         (&format!("{MAPS},noise=9mm -o x.palpate"), 2, "--maps is noise=9. Use a number of millimeters"),
         (&format!("{MAPS} -o x.palpate --real debounce=2ms"), 1, "a simulated table has other noise"),
         (&format!("{MAPS} -o x.palpate --teach brick.txt"), 2, "--teach is brick. Use objects that have no mesh"),
@@ -141,25 +141,35 @@ fn maps_and_trees_are_refused_where_the_other_is_needed_with_what_to_do() {
             1,
             "located.txt: a position, where the touches recorded here have none",
         ),
-        ("capture meshes -o x --position", 2, "`--position` was removed: make maps of meshes with palpate maps train"),
+        (
+            "capture meshes -o x --position",
+            2,
+            "`capture --position` was removed: make maps of meshes with palpate maps train",
+        ),
         ("capture meshes -o x --within 3", 2, "`--within` was removed: make maps of meshes with palpate maps train"),
         ("train free -o x.palpate --real drift=1mm/1deg", 2, "--real is drift"),
-        ("recognize maps.palpate plain.txt", 1, "plain.txt:1: the touch has no position. Give twelve"),
-        ("recognize maps.palpate deep.txt", 1, "below the table. Give times in seconds"),
-        ("recognize maps.palpate located.txt --active", 2, "--active is given"),
-        ("recognize maps.palpate located.txt --max-touches 99", 2, "--max-touches is 99"),
-        ("recognize maps.palpate located.txt --next --workspace 2000", 2, "is 2000. Use a number of millimeters"),
+        ("maps recognize maps.palpate plain.txt", 1, "plain.txt:1: the touch has no position. Give twelve"),
+        ("maps recognize maps.palpate deep.txt", 1, "below the table. Give times in seconds"),
+        ("recognize maps.palpate located.txt", 1, "maps.palpate: a model of maps … Use `palpate maps recognize`."),
+        ("maps recognize maps.palpate located.txt --max-touches 99", 2, "--max-touches is 99"),
+        ("maps recognize maps.palpate located.txt --next --workspace 2000", 2, "is 2000. Use a number of millimeters"),
         ("recognize trees.palpate located.txt", 1, "located.txt:1: touches with a position"),
-        ("recognize trees.palpate plain.txt --next", 2, "--next is given. Use it with a model of maps"),
-        ("evaluate maps.palpate data", 1, "maps.palpate: a model of maps, not of trees"),
+        ("maps recognize trees.palpate plain.txt", 1, "trees.palpate: a model of touches … Use `palpate recognize`."),
+        ("evaluate maps.palpate data", 1, "maps.palpate: a model of maps … Use `palpate maps evaluate`."),
         ("evaluate trees.palpate data", 1, "data: touches with a position"),
-        ("evaluate nothing.palpate --objects bowl", 1, "nothing.palpate: cannot read the model"),
+        ("maps evaluate nothing.palpate bowl", 1, "nothing.palpate: cannot read the model"),
         ("calibrate trees.palpate data -o x.palpate", 1, "data: touches with a position"),
-        ("calibrate maps.palpate data -o x.palpate", 1, "maps.palpate: a model of maps"),
-        ("calibrate maps.palpate data --objects meshes -o x.palpate", 2, "--objects"),
-        ("calibrate trees.palpate --objects meshes -o x.palpate", 1, "trees.palpate: a model of trees"),
-        ("calibrate trees.palpate free -o x.palpate --true-size mm", 2, "--objects is not given"),
-        ("calibrate maps.palpate --objects meshes/brick.obj --true-size mm -o x.palpate", 1, "slab is not among"),
+        (
+            "calibrate maps.palpate data -o x.palpate",
+            1,
+            "maps.palpate: a model of maps … Use `palpate maps calibrate`.",
+        ),
+        (
+            "maps calibrate trees.palpate meshes -o x.palpate",
+            1,
+            "trees.palpate: a model of touches … Use `palpate calibrate`.",
+        ),
+        ("maps calibrate maps.palpate meshes/brick.obj --true-size mm -o x.palpate", 1, "slab is not among"),
         ("inspect maps.palpate --chip m4f", 2, "--chip is"),
         ("verify maps.palpate e.json data", 1, "maps.palpate: a model of maps"),
     ] {
@@ -178,7 +188,7 @@ fn presses_on_the_bare_table_measure_it_and_the_fingertips() {
     };
     let presses: String = (0..20).map(press).collect();
     fs::write(at.join("presses.txt"), &presses).unwrap();
-    let words = "probe fit presses.txt -o hand.toml --probe nominal.toml";
+    let words = "maps level presses.txt -o hand.toml --probe nominal.toml";
     let found = figures(at, words);
     let number = |path: &str| (found.pointer(path).and_then(Value::as_f64).unwrap() * 100.0).round();
     assert_eq!(["/height/value", "/tips/0/value", "/tips/1/value", "/noise"].map(number), [80.0, 60.0, -90.0, 0.0]);
@@ -199,10 +209,10 @@ fn presses_on_the_bare_table_measure_it_and_the_fingertips() {
     for (words, code, expected) in [
         ("few.txt --probe nominal.toml", 1, "few.txt: finger 1 met the table in only 9 presses, of at least 10"),
         ("plain.txt --probe nominal.toml", 1, "plain.txt:1: the touch has no position. Give twelve columns"),
-        ("presses.txt", 2, "--probe is not in millimeters. Use a file that states it in millimeters"),
-        ("data --probe nominal.toml", 2, "SOURCE is not given. Use objects, or instead of the directory a file"),
+        ("presses.txt", 2, "--probe is not in millimeters. Use a probe file in millimeters"),
+        ("data --probe nominal.toml", 1, "data: cannot read the touches"),
     ] {
-        fails(at, &format!("probe fit {words} -o x.toml"), code, expected);
+        fails(at, &format!("maps level {words} -o x.toml"), code, expected);
     }
     assert!(!at.join("x.toml").exists());
 }
@@ -229,7 +239,7 @@ fn an_object_without_a_mesh_is_taught_by_touches_with_a_position() {
     let said = recognized(at, "mixed.palpate --next", &pressed(1.0, [-20.0, -15.0], 0.4, 8));
     assert_eq!(said.last().unwrap()["object"], "pot", "{said:?}");
     // The promise is for the taught object, too.
-    let calibrate = "calibrate mixed.palpate --objects meshes pot.txt --true-size mm -o sure.palpate";
+    let calibrate = "maps calibrate mixed.palpate meshes pot.txt --true-size mm -o sure.palpate";
     succeeds(at, &format!("{calibrate} --sequences 20 --error-rate 40%"));
     says(
         at,
@@ -263,7 +273,7 @@ fn recordings_of_objects_that_stood_still_test_a_promise() {
     for hand in ["hand", "other"] {
         succeeds(at, &format!("maps train --teach pot.txt --teach lid.txt -o {hand}.palpate --probe {hand}.toml"));
     }
-    let calibrate = "calibrate hand.palpate --recorded stays -o sure.palpate";
+    let calibrate = "maps calibrate hand.palpate --recorded stays -o sure.palpate";
     let said = succeeds(at, &format!("{calibrate} --error-rate 40%"));
     assert!(said.contains("It holds for approaches like those of 10 recordings, in any order"), "{said}");
     assert!(said.contains("note: sequences of one recording share its pose"), "{said}");
@@ -272,10 +282,10 @@ fn recordings_of_objects_that_stood_still_test_a_promise() {
     // However many sequences each of them has.
     fails(at, calibrate, 1, "recordings are too few to promise 1 %: at least 299 are needed");
     for (words, code, expected) in [
-        ("calibrate hand.palpate --recorded stays -o x.palpate --per object", 2, "or with DIR"),
-        ("calibrate hand.palpate --recorded stays -o x.palpate --real noise=1ms", 2, "or with DIR"),
-        ("calibrate hand.palpate stays --recorded stays -o x.palpate", 1, "--recorded"),
-        ("calibrate other.palpate --recorded stays -o x.palpate", 1, "spacing 12 and 15"),
+        ("maps calibrate hand.palpate --recorded stays -o x.palpate --detect-unknown", 2, "--recorded"),
+        ("maps calibrate hand.palpate --recorded stays -o x.palpate --real noise=1ms", 2, "--recorded"),
+        ("maps calibrate hand.palpate stays --recorded stays -o x.palpate", 2, "--recorded"),
+        ("maps calibrate other.palpate --recorded stays -o x.palpate", 1, "spacing 12 and 15"),
     ] {
         fails(at, words, code, expected);
     }
@@ -296,15 +306,15 @@ fn touches_with_a_position_have_a_surface_and_a_page() {
     }
     succeeds(at, "data objects pot.txt -o meshes --probe hand.toml");
     says(at, "view meshes/pot.obj -o mesh.html --true-size mm --probe hand.toml", &["nothing is wrong with the mesh"]);
-    succeeds(at, "view pot.txt -o pot.html --probe hand.toml");
+    succeeds(at, "maps view pot.txt -o pot.html --probe hand.toml");
     let page = fs::read_to_string(at.join("pot.html")).unwrap();
     assert!(page.contains("300 approaches") && page.contains("url(#guessed)") && page.contains("class=\"contact\""));
-    let two = figures(at, "view pot.txt later.txt -o two.html --probe hand.toml");
+    let two = figures(at, "maps view pot.txt later.txt -o two.html --probe hand.toml");
     assert_eq!(two["registered"], true);
     assert!(fs::read_to_string(at.join("two.html")).unwrap().contains("Difference"));
     for (words, code, expected) in [
-        ("view pot.txt -o pot.html", 2, "a probe file in millimeters"),
-        ("view bad.txt -o bad.html --probe hand.toml", 1, "bad.txt:3"),
+        ("maps view pot.txt -o pot.html", 2, "a probe file in millimeters"),
+        ("maps view bad.txt -o bad.html --probe hand.toml", 1, "bad.txt:3"),
         ("data objects bare.txt -o meshes --probe hand.toml", 1, "bare: no touch met it"),
         ("data objects plain.txt -o meshes --probe hand.toml", 1, "the touch has no position"),
     ] {
@@ -316,20 +326,21 @@ fn touches_with_a_position_have_a_surface_and_a_page() {
 fn exploring_says_where_to_touch_next_until_the_map_is_known() {
     let at = &Folder::new();
     fs::write(at.join("hand.toml"), HAND).unwrap();
+    fs::write(at.join("tenths.toml"), HAND.replace("mm", "unit")).unwrap();
     let touches = pressed(1.0, [-25.0, -20.0], 0.0, 40);
-    let said = recognized(at, "hand.toml --explore=2mm/30% --workspace 30", &touches);
+    fs::write(at.join("lines.txt"), touches).unwrap();
+    let said = lines(&succeeds(at, "maps explore hand.toml lines.txt --known 2mm/30% --workspace 30"));
     let next = &said[0]["next"];
     assert!(next["x"].as_f64().unwrap().abs() <= 30.0 && next["roll"].is_number(), "{next}");
     assert_eq!(said[0]["state"], "exploring");
     let known = said.iter().find(|line| line["state"] == "known").unwrap();
     assert!(known["next"].is_null() && known["known"].as_f64().unwrap() >= 0.3, "{known}");
     for (words, code, expected) in [
-        ("recognize hand.toml --explore=2mm lines.txt", 2, "such as 2mm/80%"),
-        ("recognize hand.toml --explore --workspace 900 lines.txt", 2, "from 1 to 200"),
-        ("recognize hand.toml --explore --max-touches 5 lines.txt", 2, "--max-touches is given"),
-        ("recognize hand.toml --explore --only pot lines.txt", 2, "--only is given"),
-        ("recognize nothing.palpate --explore lines.txt", 1, "nothing.palpate: cannot read the model"),
+        ("hand.toml lines.txt --known 2mm", 2, "such as 2mm/80%"),
+        ("hand.toml lines.txt --workspace 900", 2, "from 1 to 200"),
+        ("tenths.toml lines.txt", 1, "tenths.toml: not a usable probe file: its unit is not mm"),
+        ("nothing.palpate lines.txt", 1, "nothing.palpate: cannot read the model"),
     ] {
-        fails(at, words, code, expected);
+        fails(at, &format!("maps explore {words}"), code, expected);
     }
 }

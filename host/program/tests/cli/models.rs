@@ -342,13 +342,8 @@ fn a_promise_whatever_the_placements_shares_is_one_of_each_placement_and_says_wh
         let said = succeeds(at, &format!("export {model}.json -o {model}.palpate --verbose"));
         assert_eq!(said.contains("-leaves, outputs\n"), outputs == "placements", "{said}");
     }
-    let calibrate = "calibrate model.palpate fresh -o sure.palpate --error-rate 5% --placement-prior any";
+    let calibrate = "calibrate model.palpate fresh -o sure.palpate --error-rate 5% --per object";
     let said = says(at, calibrate, &["The rate holds in each of 6 placements"]);
     assert!(said.contains("5 % takes 59 names of each") && said.contains("2.5 % takes 119"), "{said}");
     says(at, "inspect sure.palpate", &["5 % of the names given to each object wrong"]);
-    let per_name = format!("{calibrate} --per name");
-    fails(at, &per_name, 2, "--placement-prior is any. Use stated with --per name");
-    let plain = "calibrate plain.palpate fresh -o no.palpate --error-rate 5% --placement-prior any";
-    fails(at, plain, 2, "a model that has an output for each placement");
-    assert!(!at.join("no.palpate").exists());
 }

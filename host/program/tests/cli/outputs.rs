@@ -14,8 +14,8 @@ const WRITERS: &[(&str, &[&str])] = &[
     ("export model.palpate -o out/copy.palpate --emit rust,c", &["copy.palpate", "copy.rs", "copy.h", "palpate.h"]),
     ("train data -o out/trained.json --trees rounds=2", &["trained.json"]),
     ("view ball.obj -o out/ball.html", &["ball.html"]),
-    ("view --play ball.obj --model model.palpate -o out/play.html", &["play.html"]),
-    ("view --port -o out/port.html", &["port.html"]),
+    ("play ball.obj --model model.palpate -o out/play.html", &["play.html"]),
+    ("watch -o out/port.html", &["port.html"]),
     ("data objects ball.obj -o out", &["ball.obj"]),
 ];
 

@@ -11,7 +11,7 @@ fn a_plan_is_made_evaluated_shown_and_followed() {
     let length = |name: &str| fs::metadata(at.join(name)).unwrap().len();
     // 26 directions, three pairs, four bytes before them, eight before the section, and zeros.
     assert_eq!(length("planned.palpate"), length("model.palpate") + 4 + 26 * 3 + 8 + 2);
-    let planned = figures(at, "calibrate model.palpate fresh -o again.palpate --plan 1");
+    let planned = figures(at, "plan model.palpate fresh -o again.palpate --rolls 1");
     assert_eq!((&planned["poses"], &planned["plan_bytes"]), (&26.into(), &82.into()));
     assert_eq!(fs::read(at.join("again.palpate")).unwrap(), fs::read(at.join("planned.palpate")).unwrap());
     let inspected = figures(at, "inspect planned.palpate");
@@ -38,7 +38,7 @@ fn a_plan_is_made_evaluated_shown_and_followed() {
     let text = succeeds(at, "evaluate planned.palpate unseen --sequences 100 --active");
     assert!(text.contains("Each approach is in the pose that the plan proposed, of 26"), "{text}");
 
-    let follow = "recognize planned.palpate unseen/cigar.txt --active";
+    let follow = "recognize planned.palpate unseen/cigar.txt --next";
     says(at, follow, &["next: pose "]);
     let said = lines(&succeeds(at, &format!("{follow} --json")));
     let line = said.iter().find(|line| line["verdict"] == "undecided").unwrap();
@@ -61,21 +61,20 @@ fn what_cannot_be_planned_or_followed_is_refused_with_what_to_do() {
     let at = &PLANNED.folder();
     succeeds(at, "capture meshes -o full --pose --touches 100");
     succeeds(at, "capture meshes -o blind --approaches 500");
-    let make = "palpate calibrate MODEL DIR -o OUT --plan 4";
+    let make = "palpate plan MODEL DIR -o OUT";
     for (words, code, expected) in [
-        ("calibrate model.palpate fresh -o out.palpate --plan 3", 2, "--plan is 3. Use 1, 2 or 4"),
-        ("calibrate model.palpate fresh -o out.palpate --plan 4", 1, "are in one of the poses"),
-        ("calibrate ensemble.json fresh -o out.palpate --plan 1", 1, "not a Palpate model"),
-        ("calibrate model.palpate full -o out.palpate --plan 1", 1, "--approaches N --pose"),
-        ("calibrate model.palpate blind -o out.palpate --plan 1", 1, "pose"),
+        ("plan model.palpate fresh -o out.palpate --rolls 3", 2, "--rolls is 3. Use 1, 2 or 4"),
+        ("plan model.palpate fresh -o out.palpate", 1, "are in one of the poses"),
+        ("plan ensemble.json fresh -o out.palpate", 1, "not a Palpate model"),
+        ("plan model.palpate full -o out.palpate", 1, "--approaches N --pose"),
+        ("plan model.palpate blind -o out.palpate", 1, "pose"),
         ("calibrate model.palpate fresh -o out.palpate --active", 1, "has no plan"),
-        ("calibrate m.palpate d -o out.palpate --plan 4 --error-rate 1%", 2, "cannot be used with"),
         ("evaluate model.palpate unseen --active", 1, make),
         ("evaluate ensemble.json unseen --active", 1, "has no plan"),
-        ("recognize model.palpate unseen/disc.txt --active", 1, make),
+        ("recognize model.palpate unseen/disc.txt --next", 1, make),
         ("evaluate planned.palpate full --active", 1, "--approaches N --pose"),
         // Nothing is written over what is read.
-        ("calibrate model.palpate fresh -o model.palpate --plan 1", 2, "model.palpate"),
+        ("plan model.palpate fresh -o model.palpate", 2, "model.palpate"),
     ] {
         fails(at, words, code, expected);
     }

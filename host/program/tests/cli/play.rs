@@ -8,7 +8,7 @@ const HOUSEHOLD: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../models/house
 fn a_page_is_made_of_a_model_and_objects() {
     let at = &Folder::new();
     globe(at, "my_globe", 8);
-    let words = format!("view --play mouse my_globe.obj --model {HOUSEHOLD} -o pages/play.html");
+    let words = format!("play mouse my_globe.obj --model {HOUSEHOLD} -o pages/play.html");
     let play = || {
         says(at, &words, &["play.html"]);
         fs::read_to_string(at.join("pages/play.html")).unwrap()
@@ -23,7 +23,7 @@ fn a_page_is_made_of_a_model_and_objects() {
 #[test]
 fn a_page_without_a_model_has_that_of_the_built_in_objects() {
     let at = &Folder::new();
-    succeeds(at, "view --play -o play.html bowl mouse");
+    succeeds(at, "play -o play.html bowl mouse");
     let text = fs::read_to_string(at.join("play.html")).unwrap();
     assert!(text.contains("curvature, every contact") && text.contains("\"name\":\"mouse\""));
 }
@@ -32,7 +32,7 @@ fn a_page_without_a_model_has_that_of_the_built_in_objects() {
 fn a_page_of_a_table_holds_maps_of_its_objects_and_says_what_they_expect() {
     let at = &Folder::new();
     let objects = "bowl mouse --placements bowl/+z=1 --real missed=5%";
-    succeeds(at, &format!("view --play --scene table -o table.html {objects}"));
+    succeeds(at, &format!("maps play -o table.html {objects}"));
     let text = fs::read_to_string(at.join("table.html")).unwrap();
     assert!(text.contains("The maps are of the meshes: ") && text.contains("5 % of contacts to be lost"));
     assert!(text.contains("\"maps\":") && text.contains("\"name\":\"mouse\""));
@@ -44,7 +44,6 @@ fn what_cannot_be_played_with_writes_no_page() {
     fs::write(at.join("bad.palpate"), b"no model").unwrap();
     fs::write(at.join("wide.toml"), "radius = 0.15\nspacing = 2\nspeed = 10\n").unwrap();
     globe(at, "round", 8);
-    let table = "bowl mouse --scene table";
     for (wrong, code, expected) in [
         ("bowl --model bad.palpate", 1, "bad.palpate"),
         ("bowl --touches 300", 2, "--touches"),
@@ -52,12 +51,10 @@ fn what_cannot_be_played_with_writes_no_page() {
         (&format!("bowl --probe wide.toml --model {HOUSEHOLD}"), 1, "spacing 1.5 and 2"),
         (&format!("bowl --true-size stated --model {HOUSEHOLD}"), 2, "probe"),
         ("bowl --real noise=much", 2, "5ms"),
-        ("bowl --scene table", 2, "2 to 16 objects"),
-        (&format!("{table} --model {HOUSEHOLD}"), 2, "model"),
-        (&format!("{table} --cone 30"), 2, "cone"),
-        (&format!("{table} --real debounce=1ms"), 1, "noise"),
     ] {
-        fails(at, &format!("view --play -o play.html {wrong}"), code, expected);
+        fails(at, &format!("play -o play.html {wrong}"), code, expected);
     }
+    fails(at, "maps play -o play.html bowl", 2, "2 to 16 objects");
+    fails(at, "maps play -o play.html bowl mouse --real debounce=1ms", 1, "noise");
     assert_eq!(listing(at), ["bad.palpate", "round.obj", "wide.toml"]);
 }

@@ -118,7 +118,7 @@ fn a_model_of_another_file_is_told_with_the_first_tree_that_differs() {
 #[test]
 fn each_row_gets_a_verdict_of_its_own_or_adds_to_the_last() {
     let at = &three_classes("xgboost-2.1-softprob.ubj");
-    let said = lines(&succeeds(at, "recognize model.palpate rows.csv --features --json"));
+    let said = lines(&succeeds(at, "rows recognize model.palpate rows.csv --json"));
     let margins = best_and_margins(at);
     assert_eq!(said.len(), margins.len());
     for (line, (best, margins)) in said.iter().zip(margins) {
@@ -127,7 +127,7 @@ fn each_row_gets_a_verdict_of_its_own_or_adds_to_the_last() {
         let sum: f64 = margins.iter().map(|margin| (margin - margins[best]).exp()).sum();
         assert!((line["posterior"].as_f64().unwrap() - 1.0 / sum).abs() < 1e-3, "{line}");
     }
-    let added = lines(&succeeds(at, "recognize model.palpate rows.csv --features --add-up --json"));
+    let added = lines(&succeeds(at, "rows recognize model.palpate rows.csv --add-up --json"));
     assert_eq!(added.len(), said.len());
     assert!(added.iter().map(|line| line["rows"].as_u64().unwrap()).max() > Some(1));
 }
@@ -137,7 +137,7 @@ fn columns_are_found_by_their_names_in_every_command_and_by_position_only_where_
     let at = &three_classes("xgboost-2.1-softprob.ubj");
     let margins = |text: &str| {
         fs::write(at.join("asked.csv"), text).unwrap();
-        let said = palpate(at, "recognize model.palpate asked.csv --features --json");
+        let said = palpate(at, "rows recognize model.palpate asked.csv --json");
         let note = String::from_utf8_lossy(&said.stderr).into_owned();
         (json(said)["margins"].clone(), note)
     };
@@ -151,11 +151,11 @@ fn columns_are_found_by_their_names_in_every_command_and_by_position_only_where_
     // One name of four is another one: no column takes its place, in any command.
     fs::write(at.join("labeled.csv"), "width,Height,count,angle,kind,id\n1,990,2,0.5,cup,1\n").unwrap();
     for words in [
-        "recognize model.palpate labeled.csv --features",
+        "rows recognize model.palpate labeled.csv",
         "verify model.palpate source.ubj labeled.csv",
-        "evaluate model.palpate labeled.csv --label kind",
-        "evaluate model.palpate labeled.csv --label kind --sequence-column id",
-        "calibrate model.palpate labeled.csv -o no.palpate --label kind --sequence-column id",
+        "rows evaluate model.palpate labeled.csv --label kind",
+        "rows evaluate model.palpate labeled.csv --label kind --sequence-column id",
+        "rows calibrate model.palpate labeled.csv -o no.palpate --label kind --sequence-column id",
         "export source.ubj -o no.palpate --scale labeled.csv",
     ] {
         let expected =
@@ -218,10 +218,16 @@ fn models_of_rows_and_of_touches_are_not_taken_for_each_other() {
     succeeds(at, "export source.ubj -o of-rows.palpate");
     fs::write(at.join("touches.txt"), "0 0 0.08\n").unwrap();
     fs::write(at.join("other.csv"), "curvature,slope\n1,2\n").unwrap();
-    let on_a_chip = "of-rows.palpate: the model is over rows of features … palpate recognize MODEL ROWS.csv --features";
+    let on_a_chip = "of-rows.palpate: the model is over rows of features … palpate rows recognize MODEL ROWS.csv";
     for (words, expected) in [
-        ("recognize of-rows.palpate touches.txt", "works on rows of features, not on touches"),
-        ("recognize model.palpate other.csv --features", "is over touches, not over rows"),
+        ("recognize of-rows.palpate touches.txt", "of-rows.palpate: a model of rows … Use `palpate rows recognize`."),
+        ("evaluate of-rows.palpate data", "of-rows.palpate: a model of rows … Use `palpate rows evaluate`."),
+        ("plan of-rows.palpate data -o x", "of-rows.palpate: a model of rows … Give a model of touches."),
+        ("rows recognize model.palpate other.csv", "model.palpate: a model of touches … Use `palpate recognize`."),
+        (
+            "rows calibrate model.palpate other.csv -o x --label a --sequence-column b",
+            "model.palpate: a model of touches … Use `palpate calibrate`.",
+        ),
         ("link emulator --load of-rows.palpate rows.csv", on_a_chip),
     ] {
         fails(at, words, 1, expected);
@@ -240,26 +246,26 @@ fn labeled_rows_are_evaluated_one_by_one() {
         labeled += &format!("{row},{label}\n");
     }
     fs::write(at.join("labeled.csv"), labeled).unwrap();
-    let evaluated = figures(at, "evaluate model.palpate labeled.csv --label kind");
+    let evaluated = figures(at, "rows evaluate model.palpate labeled.csv --label kind");
     assert_eq!(evaluated["rows"], 60);
     assert!((evaluated["accuracy"].as_f64().unwrap() - 59.0 / 60.0).abs() < 1e-12, "{evaluated}");
     // The file's own classes have no such names.
     let expected = "labeled.csv: the label … none of the model's classes";
-    fails(at, "evaluate source.ubj labeled.csv --label kind", 1, expected);
+    fails(at, "rows evaluate source.ubj labeled.csv --label kind", 1, expected);
 }
 
 #[test]
 fn a_regression_gives_its_value_and_no_verdict_and_its_labels_are_numbers() {
     let at = &library("catboost-1.2-regression.json");
     succeeds(at, "export source.json -o model.palpate --leaf f32");
-    let said = lines(&succeeds(at, "recognize model.palpate rows.csv --features --json"));
+    let said = lines(&succeeds(at, "rows recognize model.palpate rows.csv --json"));
     for (line, margin) in said.iter().zip(of_library(at, "margin")) {
         assert!((line["margins"][0].as_f64().unwrap() - margin.parse::<f64>().unwrap()).abs() < 1e-5);
         assert_eq!(line["value"].as_f64().unwrap() as f32, line["margins"][0].as_f64().unwrap() as f32);
         assert_eq!(line.get("verdict"), None);
     }
     fs::write(at.join("labeled.csv"), "width,height,count,angle,amount\n1,990,2,0.5,2\n").unwrap();
-    let evaluated = figures(at, "evaluate model.palpate labeled.csv --label amount");
+    let evaluated = figures(at, "rows evaluate model.palpate labeled.csv --label amount");
     assert_eq!(evaluated["mean_absolute_error"], evaluated["root_mean_square_error"]);
 }
 
@@ -407,7 +413,7 @@ fn what_a_file_does_not_say_is_said_at_export_and_can_be_stated() {
     let export = "export source.txt -o m --leaf f32 --verbose";
     says(at, export, &["Predicts the value e^x of the margin x"]);
     let predicted = || {
-        let text = succeeds(at, "recognize m rows.csv --features");
+        let text = succeeds(at, "rows recognize m rows.csv");
         text.lines().map(|line| line.split_whitespace().nth(1).unwrap().parse::<f64>().unwrap()).collect::<Vec<_>>()
     };
     let after = predicted();
@@ -449,7 +455,7 @@ fn sequences(at: &Path, count: usize, first: usize) -> String {
     let text = fs::read_to_string(at.join("rows.csv")).unwrap();
     let (header, rows) = text.split_once('\n').unwrap();
     let rows: Vec<&str> = rows.lines().collect();
-    let said = lines(&succeeds(at, "recognize model.palpate rows.csv --features --json"));
+    let said = lines(&succeeds(at, "rows recognize model.palpate rows.csv --json"));
     let mut text = format!("id,kind,{header}\n");
     for number in first..first + count {
         let name = ["cup", "jug", "pan"][number % 3];
@@ -471,7 +477,7 @@ fn sequences_of_rows_are_calibrated_evaluated_and_recognized_verdict_after_verdi
     let at = &three_classes("xgboost-3.4-softprob.ubj");
     fs::write(at.join("fresh.csv"), sequences(at, 300, 0)).unwrap();
     fs::write(at.join("unseen.csv"), sequences(at, 300, 300)).unwrap();
-    let calibrate = format!("calibrate model.palpate fresh.csv -o sure.palpate {COLUMNS} --error-rate 10%");
+    let calibrate = format!("rows calibrate model.palpate fresh.csv -o sure.palpate {COLUMNS} --error-rate 10%");
     let found = figures(at, &calibrate);
     assert_eq!(
         (&found["promised"], &found["per"], &found["learned"]),
@@ -480,21 +486,21 @@ fn sequences_of_rows_are_calibrated_evaluated_and_recognized_verdict_after_verdi
     assert_eq!(found["sequences"], 225);
     let text = succeeds(at, &calibrate);
     assert!(text.starts_with("At most 10 % of the names are wrong, on average. Confidence 95 %: of all"), "{text}");
-    let evaluate = format!("evaluate sure.palpate unseen.csv {COLUMNS}");
+    let evaluate = format!("rows evaluate sure.palpate unseen.csv {COLUMNS}");
     let found = figures(at, &format!("{evaluate} --page page.html"));
     assert!(found["error"].as_f64() < Some(0.15) && found["promise"]["promised"] == 0.1, "{found}");
     assert_eq!(found["confusion"].as_array().unwrap().len(), 3);
     let html = fs::read_to_string(at.join("page.html")).unwrap();
     holds(&html, &["Rows to a verdict", "early stopping", "majority vote", "Confusion", "as it grows"]);
     says(at, &evaluate, &["promised: at most 10 % wrong", "no name"]);
-    let streamed = palpate(at, "recognize sure.palpate unseen.csv --features --add-up");
+    let streamed = palpate(at, "rows recognize sure.palpate unseen.csv --add-up");
     let note = String::from_utf8_lossy(&streamed.stderr).into_owned();
     let about =
         "nothing says where a sequence ends (--sequence-column), so the promise of 10 % is for the first verdict alone";
     assert_eq!(note.matches(about).count(), 1, "{note}");
     let said = stdout(streamed);
     assert!(said.lines().filter(|line| line.contains("recognized")).count() > 100, "{said}");
-    let only = succeeds(at, "recognize sure.palpate unseen.csv --features --add-up --only cup,pan");
+    let only = succeeds(at, "rows recognize sure.palpate unseen.csv --add-up --only cup,pan");
     assert!(!only.lines().any(|line| line.contains("recognized") && line.contains("jug")), "{only}");
 }
 
@@ -509,8 +515,8 @@ fn evidence_ends_where_a_sequence_does_and_nothing_is_said_of_one_after_its_verd
     let text = format!("{header}\n{}\n", rows.join("\n"));
     fs::write(at.join("unseen.csv"), &text).unwrap();
     // A rate that takes two rows or more.
-    let found = figures(at, &format!("evaluate model.palpate unseen.csv {COLUMNS} --error-rate 20%"));
-    let recognize = "recognize model.palpate unseen.csv --features --add-up --sequence-column id";
+    let found = figures(at, &format!("rows evaluate model.palpate unseen.csv {COLUMNS} --error-rate 20%"));
+    let recognize = "rows recognize model.palpate unseen.csv --add-up --sequence-column id";
     let said = lines(&succeeds(at, &format!("{recognize} --error-rate 20% --json")));
     let (mut wrong, mut named, mut undecided) = (0, 0, 0);
     for number in 300..600 {
@@ -535,7 +541,7 @@ fn evidence_ends_where_a_sequence_does_and_nothing_is_said_of_one_after_its_verd
         fs::write(at.join("unseen.csv"), text.replacen(row, instead, 1)).unwrap();
         fails(at, recognize, 1, expected);
     }
-    fails(at, "recognize model.palpate unseen.csv --features --sequence-column id", 2, "--add-up");
+    fails(at, "rows recognize model.palpate unseen.csv --sequence-column id", 2, "--add-up");
 }
 
 #[test]
@@ -547,11 +553,11 @@ fn a_promise_for_groups_says_when_none_are_given_and_copies_are_noted() {
     let person = |line: &str| line.split(',').next().unwrap().parse::<u32>().unwrap() / 2;
     let with: Vec<String> = rows.lines().map(|line| format!("{line},{}", person(line))).collect();
     fs::write(at.join("fresh.csv"), format!("{header},person\n{}\n", with.join("\n"))).unwrap();
-    let calibrate = format!("calibrate model.palpate fresh.csv -o sure.palpate --error-rate 20% {COLUMNS}");
+    let calibrate = format!("rows calibrate model.palpate fresh.csv -o sure.palpate --error-rate 20% {COLUMNS}");
     let expected = "Confidence 95 %: of all calibrations at most 5 % state a promise that fails.";
     let text = says(at, &format!("{calibrate} --group-column person"), &[expected]);
     assert!(text.starts_with("At most 20 % of the names are wrong in new groups, on average."), "{text}");
-    let evaluate = format!("evaluate sure.palpate fresh.csv {COLUMNS}");
+    let evaluate = format!("rows evaluate sure.palpate fresh.csv {COLUMNS}");
     says(at, &format!("{evaluate} --group-column person"), &[" were, each group weighing the same: "]);
     let alone = " were, each sequence as a group of its own, as none are given (--group-column): ";
     says(at, &evaluate, &[alone]);
@@ -576,7 +582,7 @@ fn what_cannot_be_promised_of_sequences_of_rows_is_refused_with_what_to_do() {
     ] {
         fs::write(at.join("fresh.csv"), text).unwrap();
         let (model, more) = more.split_once(' ').unwrap_or((more, ""));
-        fails(at, &format!("calibrate {model} fresh.csv -o no.palpate --label kind {more}"), code, expected);
+        fails(at, &format!("rows calibrate {model} fresh.csv -o no.palpate --label kind {more}"), code, expected);
         assert!(!at.join("no.palpate").exists());
     }
 }

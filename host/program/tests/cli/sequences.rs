@@ -69,26 +69,26 @@ fn a_model_that_counts_rows_gives_the_verdicts_of_the_ensemble_with_the_numbers_
         succeeds(at, &format!("export ramps.json -o plain {scale}"));
         succeeds(at, &format!("export ramps.json -o counts --row-number number {scale}"));
         let [mut by_hand, mut counted] = ["plain numbered-fresh.csv -o by-hand", "counts fresh.csv -o counted"]
-            .map(|files| figures(at, &format!("calibrate {files} --error-rate 10% {COLUMNS}")));
+            .map(|files| figures(at, &format!("rows calibrate {files} --error-rate 10% {COLUMNS}")));
         for key in ["error", "undecided", "margins"] {
             assert!(!counted[key].is_null(), "{key}");
             assert_eq!(by_hand[key].take(), counted[key].take(), "{key}");
         }
         let recognize = |files: &str| {
-            let words = format!("recognize {files} --features --add-up --sequence-column id --json");
+            let words = format!("rows recognize {files} --add-up --sequence-column id --json");
             lines(&succeeds(at, &words))
         };
         let said = recognize("counted unseen.csv");
         assert_eq!(said, recognize("by-hand numbered-unseen.csv"));
         let recognized = said.iter().filter(|line| line["verdict"] == "recognized").count();
         assert!(recognized > 100, "{recognized} of 200 sequences are recognized");
-        let confusion = |files: &str| figures(at, &format!("evaluate {files} {COLUMNS}"))["confusion"].take();
+        let confusion = |files: &str| figures(at, &format!("rows evaluate {files} {COLUMNS}"))["confusion"].take();
         assert_eq!(confusion("counted unseen.csv"), confusion("by-hand numbered-unseen.csv"));
         // A row by itself has no number other than its own.
         let [own, other] = ["counted", "by-hand"]
-            .map(|model| succeeds(at, &format!("recognize {model} numbered-unseen.csv --features --json")));
+            .map(|model| succeeds(at, &format!("rows recognize {model} numbered-unseen.csv --json")));
         assert_eq!(own, other);
-        fails(at, "recognize counted unseen.csv --features", 1, "no column is named number");
+        fails(at, "rows recognize counted unseen.csv", 1, "no column is named number");
         let inspected = figures(at, "inspect counted");
         assert_eq!((&inspected["position"], inspected.get("guard")), (&json!("number"), None));
         says(at, "inspect counted", &["row number     number, which recognizers count\n"]);
@@ -101,7 +101,7 @@ fn a_guard_names_the_sensor_that_is_stuck_missing_or_out_of_its_range() {
     let at = &place();
     succeeds(at, "export ramps.json -o counts --row-number number");
     write(at, "fresh.csv", &ramps(400, 1));
-    let text = succeeds(at, &format!("calibrate counts fresh.csv -o sure --error-rate 10% --guard {COLUMNS}"));
+    let text = succeeds(at, &format!("rows calibrate counts fresh.csv -o sure --error-rate 10% --guard {COLUMNS}"));
     assert!(text.contains("Guard: refuses ") && text.contains(" that it was not learned from\n"), "{text}");
     let guard = figures(at, "inspect sure")["guard"].take();
     let (number, height) = (&guard[0], &guard[1]);
@@ -129,7 +129,7 @@ fn a_guard_names_the_sensor_that_is_stuck_missing_or_out_of_its_range() {
     };
     let broken = [failing(1, "0.1"), failing(2, ""), failing(3, "40"), failing(4, "-40")];
     write(at, "broken.csv", &broken.into_iter().flatten().collect::<Vec<_>>());
-    let recognize = "recognize sure broken.csv --features --add-up --sequence-column id";
+    let recognize = "rows recognize sure broken.csv --add-up --sequence-column id";
     let said = lines(&succeeds(at, &format!("{recognize} --json")));
     let refused = |id: &str| -> Vec<(u64, &str)> {
         let own = said.iter().filter(|line| line["sequence"] == id && line.get("refused").is_some());
@@ -148,12 +148,12 @@ fn a_guard_names_the_sensor_that_is_stuck_missing_or_out_of_its_range() {
     let last = said.iter().rfind(|line| line["sequence"] == "4").unwrap();
     assert_eq!((&last["rows"], &last["margins"]), (&json!(5), &json!([])), "rows that are refused count nothing");
     says(at, recognize, &[&format!("  2  refused: {missing}\n")]);
-    let evaluate = format!("evaluate sure broken.csv {COLUMNS}");
+    let evaluate = format!("rows evaluate sure broken.csv {COLUMNS}");
     let text = succeeds(at, &evaluate);
     assert!(text.starts_with("4 sequences, 21 rows, 15 others refused\n"), "{text}");
     assert_eq!(figures(at, &evaluate)["refused"], 15);
     // Without one nothing is refused.
-    let text = succeeds(at, &format!("calibrate sure fresh.csv -o plain --error-rate 10% {COLUMNS}"));
+    let text = succeeds(at, &format!("rows calibrate sure fresh.csv -o plain --error-rate 10% {COLUMNS}"));
     assert!(!text.contains("Guard") && !succeeds(at, "inspect plain").contains("guard"));
 }
 
@@ -178,8 +178,8 @@ fn numbers_of_rows_and_guards_are_refused_where_there_is_no_such_feature_or_no_s
         ("export regression.json -o x --row-number width", 2, classes),
         ("export touches.json -o x --row-number curvature", 2, "Use it with classes of rows"),
         ("export model.palpate -o x --emit c --row-number number", 2, "model.palpate is a compiled model"),
-        (&format!("calibrate value.palpate {columns}"), 1, "value.palpate"),
-        ("calibrate model.palpate fresh.csv -o x --error-rate 10% --guard --label kind", 2, "--sequence-column"),
+        (&format!("rows calibrate value.palpate {columns}"), 1, "value.palpate"),
+        ("rows calibrate model.palpate fresh.csv -o x --error-rate 10% --guard --label kind", 2, "--sequence-column"),
     ] {
         fails(at, words, code, expected);
     }

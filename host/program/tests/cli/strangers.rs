@@ -10,7 +10,7 @@ fn a_stranger_is_unknown_to_a_model_that_was_calibrated_for_strangers() {
     let trained = figures(at, "train data -o e.json --trees rounds=10 --background shapes");
     assert_eq!(trained["objects"], 2, "a background is no object");
     succeeds(at, "export e.json -o m.palpate");
-    let calibrated = figures(at, "calibrate m.palpate fresh -o c.palpate --strangers likely --background shapes");
+    let calibrated = figures(at, "calibrate m.palpate fresh -o c.palpate --detect-unknown --background shapes");
     assert!(calibrated["strangers"]["false_alarms"].as_f64().unwrap() <= 0.02, "{calibrated}");
 
     let evaluate = "evaluate c.palpate unseen --unknown others";
@@ -41,8 +41,9 @@ fn strangers_and_backgrounds_that_cannot_be_are_refused_and_nothing_is_written()
     std::fs::write(at.join("partial/more.txt"), "0 - 0.1\n".repeat(100)).unwrap();
     for (words, code, expected) in [
         ("evaluate ensemble.json data --unknown data", 1, "data: the model knows the object bowl"),
-        ("calibrate model.palpate data -o x.palpate --strangers maybe", 2, "off, likely"),
-        ("calibrate model.palpate data -o x.palpate --strangers likely --recorded data", 2, "--recorded"),
+        ("calibrate model.palpate data -o x.palpate --strangers likely", 2, "was removed: use --detect-unknown"),
+        ("calibrate model.palpate data -o x.palpate --background data", 2, "--detect-unknown"),
+        ("calibrate model.palpate data -o x.palpate --detect-unknown --recorded data", 2, "--recorded"),
         ("train data -o x.json --background partial", 1, "palpate capture background"),
         ("train named -o x.json --background shapes", 1, "called background"),
     ] {

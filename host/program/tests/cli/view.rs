@@ -19,14 +19,14 @@ fn a_page_shows_a_mesh_of_ones_own_with_the_touches_that_were_asked_for() {
 }
 
 #[test]
-fn a_page_that_watches_a_chip_needs_no_object_and_takes_one_model() {
+fn a_page_that_watches_a_chip_needs_no_object_and_takes_a_model() {
     let at = &Folder::new();
     let model = concat!(env!("CARGO_MANIFEST_DIR"), "/../../models/household.palpate");
-    says(at, "view --port -o chip.html", &["chip.html"]);
+    says(at, "watch -o chip.html", &["chip.html"]);
     assert!(std::fs::read_to_string(at.join("chip.html")).unwrap().contains("\"model\":null"));
-    succeeds(at, &format!("view --port -o chip.html --model {model}"));
+    succeeds(at, &format!("watch {model} -o chip.html"));
     let text = std::fs::read_to_string(at.join("chip.html")).unwrap();
-    assert!(text.contains("\"thresholds\":[0.9") && text.contains(&format!("--model {model}")));
+    assert!(text.contains("\"thresholds\":[0.9") && text.contains(&format!("palpate watch {model} -o chip.html")));
 }
 
 #[test]
@@ -34,20 +34,13 @@ fn wrong_arguments_write_no_page() {
     let at = &Folder::new();
     std::fs::create_dir(at.join("set")).unwrap();
     ["one", "two"].iter().for_each(|name| _ = globe(&at.join("set"), name, 4));
-    let model = concat!(env!("CARGO_MANIFEST_DIR"), "/../../models/household.palpate");
     for (wrong, code, expected) in [
-        ("bowl -o page.html --real noise=5ms", 2, "--real is given. Use it with --play"),
+        ("bowl -o page.html --real noise=5ms", 2, "unexpected argument '--real'"),
+        ("touches.txt -o page.html", 1, "touches.txt: touches, and no mesh. Use `palpate maps view`."),
         ("bowl -o page.html --length 9", 2, "unexpected argument '--length'"),
         ("bowl -o page.html --touches many", 2, "many"),
         ("bowl", 2, "--output"),
         ("set -o page.html", 1, "2 objects, where one is needed. Give one mesh file"),
-        ("--port -o page.html bowl", 2, "cannot be used"),
-        ("--port -o page.html --play", 2, "cannot be used"),
-        ("--port -o page.html --probe probe.toml", 2, "cannot be used"),
-        ("--port -o page.html --true-size mm", 2, "cannot be used"),
-        ("--port -o page.html --scene table", 2, "cannot be used"),
-        ("--port -o page.html --real noise=1ms", 2, "cannot be used"),
-        (&format!("--port -o page.html --model {model} --model {model}"), 2, "one with --port"),
     ] {
         fails(at, &format!("view {wrong}"), code, expected);
     }

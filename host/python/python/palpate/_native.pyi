@@ -673,7 +673,7 @@ class Surface:
 
 def calibrate(model: Model, rows: ArrayLike, labels: SupportsGetItem[int, str], sequence: SupportsGetItem[int, str], *, groups: SupportsGetItem[int, str] | None = None, error_rate: SupportsFloat | SupportsIndex = 0.01, per: str = "average", confidence: SupportsFloat | SupportsIndex = 0.95, max_rows: SupportsIndex | None = None, strangers: str | None = None, background: ArrayLike | None = None, background_sequence: SupportsGetItem[int, str] | None = None, guard: bool = False, learned: SupportsGetItem[int, tuple[Model, ArrayLike, SupportsGetItem[int, str], SupportsGetItem[int, str], SupportsGetItem[int, str] | None]] | None = None, seed: SupportsIndex = 1, progress: Progress | None = None) -> tuple[Model, str]:
     """
-    Sets a model's thresholds on sequences of rows, and returns the model and what `palpate calibrate --json` prints.
+    Sets a model's thresholds on sequences of rows, and returns the model and what `palpate rows calibrate --json` prints.
     """
 
 def capture(meshes: Meshes, *, touches: SupportsIndex = 21000, seed: SupportsIndex = 1, probe: Probe | None = None, approaches: bool | SupportsIndex = ..., pose: bool = False, aim: str = "box", cone: SupportsFloat | SupportsIndex | None = None, length: SupportsFloat | SupportsIndex = 10.0, millimeters: SupportsFloat | SupportsIndex | None = None, instances: bool = False, samples: tuple[SupportsIndex, SupportsIndex] | None = None, out: str | PathLike[str] | None = None, force: bool = False, threads: SupportsIndex | None = None, progress: Progress | None = None) -> DataSet:
@@ -737,7 +737,7 @@ def evaluate(model: Model | Ensemble, data: DataSet, *, at: SupportsGetItem[int,
 
 def evaluate_sequences(model: Model, rows: ArrayLike, labels: SupportsGetItem[int, str], sequence: SupportsGetItem[int, str], *, groups: SupportsGetItem[int, str] | None = None, error_rate: SupportsFloat | SupportsIndex | None = None, max_rows: SupportsIndex | None = None) -> str:
     """
-    Measures a model on sequences of rows, and returns what `palpate evaluate --json` prints.
+    Measures a model on sequences of rows, and returns what `palpate rows evaluate --json` prints.
     """
 
 def parity(ensemble: Ensemble, model: Model, data: DataSet, *, sequences: SupportsIndex = 10000, seed: SupportsIndex = 1, progress: Progress | None = None) -> str:

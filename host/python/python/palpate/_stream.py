@@ -42,7 +42,7 @@ class Calibrated:
     groups: int | None
     """Groups that the promise rests on, and is for."""
     raw: dict[str, Any] = field(repr=False)
-    """All figures, as `palpate calibrate --json` prints them."""
+    """All figures, as `palpate rows calibrate --json` prints them."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class Ends:
     fixed_rows: float | None
     """The least fixed number of rows with which no more names are wrong; `None` if all rows are not enough."""
     raw: dict[str, Any] = field(repr=False)
-    """All figures, as `palpate evaluate --json` prints them."""
+    """All figures, as `palpate rows evaluate --json` prints them."""
 
 
 def _texts(values: _Ids) -> list[str]:

@@ -43,7 +43,7 @@ fn contender(names: [&str; 2]) -> Contender {
 }
 
 fn settings() -> Settings {
-    Settings { origin: Origin::default(), noise: Noise::switch(), command: "palpate view --play".into() }
+    Settings { origin: Origin::default(), noise: Noise::switch(), command: "palpate play".into() }
 }
 
 #[test]

@@ -4,7 +4,7 @@ use crate::small::model;
 #[test]
 fn a_page_holds_everything_itself_is_small_and_names_cannot_break_out_of_it() {
     for model in [None, Some(model(["</script><script>alert(1)</script>", "<b>"]))] {
-        let page = page(model.as_ref(), "palpate view --port -o '<i>.html'").unwrap();
+        let page = page(model.as_ref(), "palpate watch -o '<i>.html'").unwrap();
         assert!(page.len() < 150_000, "{} bytes", page.len());
         assert!(!page.contains("<script>alert") && !page.contains("<b>") && !page.contains("<i>"));
         for part in ["http:", "https:", "url(", "@import", "src=\"", "fetch(", "import("] {

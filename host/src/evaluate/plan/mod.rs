@@ -141,8 +141,7 @@ pub fn plan(model: &Model<'_>, dataset: &Dataset, rolls: u8) -> Result<Planned> 
 /// The problem of a model without a plan.
 pub fn no_plan() -> Error {
     problem!("the model has no plan of approaches").fix(
-        "Add one: `palpate calibrate MODEL DIR -o OUT --plan 4`, from approaches with pose. An ensemble (JSON) has to be exported \
-         first.",
+        "Add one: `palpate plan MODEL DIR -o OUT`, from approaches with pose. An ensemble (JSON) has to be exported first.",
     )
 }
 

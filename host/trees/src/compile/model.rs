@@ -43,8 +43,7 @@ impl CompiledModel {
             Err(_) if bytes.starts_with(&MAGIC) && Header::of(&bytes).layout() == MAPS_LAYOUT => {
                 Err(problem!("a model of maps, not of trees")
                     .fix(
-                        "`palpate inspect` and `recognize` take it, and `evaluate` with --objects and `calibrate` with \
-                         --objects or --recorded alone; other commands take models of trees.",
+                        "`palpate inspect`, `palpate link` and the commands of `palpate maps` take it; other commands take models of trees.",
                     )
                     .at(Place::file(path)))
             }

@@ -65,7 +65,7 @@ pub fn evaluate_rows(candidate: Candidate<'_>, rows: &Rows) -> Result<RowsEvalua
         Predicted::Classes(classes) => classes,
         Predicted::Values(_) if names.len() > 1 => {
             return Err(problem!("the model has {} targets, and a row has one label", names.len()).fix(
-                "Compare the values that `palpate recognize --features` prints for each row, or `palpate verify` with the \
+                "Compare the values that `palpate rows recognize` prints for each row, or `palpate verify` with the \
                  library's margins.",
             ));
         }

@@ -1,4 +1,4 @@
-//! The host's end of the link as WebAssembly: functions that the script of `palpate view --port` calls, and nothing that they
+//! The host's end of the link as WebAssembly: functions that the script of `palpate watch` calls, and nothing that they
 //! import.
 //!
 //! Bytes come through [`input`], which says where in memory the script may write them. What a call brings goes out as bytes

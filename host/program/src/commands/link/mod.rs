@@ -2,9 +2,9 @@
 
 pub(super) mod record;
 
+use crate::commands::maps::print_located;
 use crate::commands::progress::Bar;
 use crate::commands::recognize_lines::Line;
-use crate::commands::recognize_maps::print_located;
 use crate::commands::{self, Global};
 use palpate::chip::{
     Asks, ChipModel, Connection, Emulator, Entry, Located, Port, Steps, Summary, Transport, Update, no_rows,
@@ -48,15 +48,14 @@ impl LineOptions {
 
 #[derive(clap::Args)]
 #[command(after_help = "\
-The chip runs the firmware in onboard/firmware (uart), or a program of your own around palpate_onboard::station. A touch is one line of three contact times in seconds (- for a missing contact), as in a data set; an empty line begins another object. Maps take twelve columns, as `palpate recognize` does. Without touches, a line is printed for each touch of the chip's own fingers, until Ctrl-C or --stop-after; `palpate data record` records them.
+The chip runs the firmware in onboard/firmware (uart), or a program of your own around palpate_onboard::station. A touch is one line of three contact times in seconds (- for a missing contact), as in a data set; an empty line begins another object. Maps take twelve columns, as `palpate maps recognize` does; --next then prints what that prints. Without touches, a line is printed for each touch of the chip's own fingers, until Ctrl-C or --stop-after; `palpate data record` records them.
 
 Examples:
   palpate link /dev/ttyACM0                           what is on the chip, and what do its fingers touch?
   palpate link /dev/ttyACM0 --load model.palpate      load a model into it
   palpate link /dev/ttyACM0 touches/                  recognize a data set
   echo '0.030 0 0.050' | palpate link /dev/ttyACM0 -  recognize typed touches
-  palpate link /dev/ttyACM0 - --active                where to touch next
-  robot | palpate link /dev/ttyACM0 - --load maps.palpate --next
+  palpate link /dev/ttyACM0 - --next                  where to touch next
   palpate link emulator --load model.palpate --parity touches/ --stop-after 10000")]
 pub(crate) struct Arguments {
     /// A serial port, tcp://HOST:PORT, or emulator
@@ -72,13 +71,10 @@ pub(crate) struct Arguments {
     /// Stop after this many touches in all [default: all that there are]
     #[arg(long, value_name = "N")]
     stop_after: Option<u64>,
-    /// Follow the model's plan of approaches; asks the chip after each touch for the next one
+    /// Say after each touch where to touch next
     #[arg(long)]
-    active: bool,
-    /// With a model of maps: print each touch's verdict, place and next approach as JSON
-    #[arg(long, conflicts_with = "active")]
     next: bool,
-    /// Proposed approaches send the middle finger at most so far from the table's origin in x and y [default: twice the maps' range]
+    /// Keep the middle finger this close to the table's origin, in x and y [default: twice the maps' range]
     #[arg(long, value_name = "MM", requires = "next")]
     workspace: Option<f64>,
     #[command(flatten)]
@@ -98,16 +94,12 @@ impl Arguments {
 
     /// The question to a chip with this model after each touch.
     fn asks(&self, chip: &ChipModel) -> Result<Asks> {
-        let (option, allowed) = match (self.active, self.next, chip.info.has_maps()) {
-            (true, _, true) => {
-                ("active", "it with a model of trees; a model of maps says with --next where to touch next")
-            }
-            (_, true, false) => ("next", "it with a model of maps; for a model with a plan, use --active"),
-            (true, ..) => return Ok(Asks::Approach),
-            (_, true, _) => return Ok(Asks::Place { within: self.workspace.map(locate::within).transpose()? }),
-            _ => return Ok(Asks::Nothing),
-        };
-        Err(Error::setting(option, "given", allowed))
+        match (self.next, chip.info.has_maps(), self.workspace) {
+            (false, ..) => Ok(Asks::Nothing),
+            (true, true, workspace) => Ok(Asks::Place { within: workspace.map(locate::within).transpose()? }),
+            (true, false, None) => Ok(Asks::Approach),
+            (true, false, Some(_)) => Err(Error::setting("workspace", "given", "it with a model of maps")),
+        }
     }
 
     /// The touches in `source`: a data set's directory, a file of lines, a log, or `-` for standard input.
@@ -161,7 +153,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     };
 
     let asks = arguments.asks(&chip)?;
-    printer.prints_places = arguments.next;
+    printer.prints_places = matches!(asks, Asks::Place { .. });
     let progress = Bar::new();
     progress.begin("touching", steps.count());
     let interactive = steps.count().is_none();
@@ -173,7 +165,8 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         Ok(ControlFlow::Continue(()))
     })?;
     drop(progress);
-    printer.summary(&summary, arguments.next && arguments.parity.is_none())?;
+    let is_silent = printer.prints_places && arguments.parity.is_none();
+    printer.summary(&summary, is_silent)?;
     match summary.first_difference {
         Some(first) if arguments.parity.is_some() => {
             let Summary { differences, compared, .. } = summary;

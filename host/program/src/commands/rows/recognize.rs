@@ -1,15 +1,57 @@
-//! `palpate recognize --features`: rows instead of touches.
+//! `palpate rows recognize`.
 
-use super::rows::read_rows;
+use super::read_rows;
+use crate::commands::Global;
+use crate::commands::expected::ExpectedArguments;
+use crate::commands::kinds::{self, ModelKind};
+use crate::commands::numbers::error_rate;
+use crate::commands::recognize::stopping;
+use clap::ArgGroup;
 use palpate::Result;
-use palpate::evaluate::over_touches;
 use palpate::evaluate::verify::margins;
+use palpate::evaluate::{self, too_many_objects};
 use palpate::output;
 use palpate::rows::{Encoder, Features, RowOf, SequencesBuilder};
 use palpate::stream::refusal;
 use palpate_onboard::{Recognizer, RowsSeen, Verdict};
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+#[derive(clap::Args)]
+#[command(
+    group(
+        ArgGroup::new("of_sums")
+            .args(["sequence_column", "error_rate", "max_rows", "prior", "only"])
+            .multiple(true)
+            .requires("add_up")
+    ),
+    after_help = "\
+Each line in is a row of features: CSV with the features' names in the header. Each line out is the class of the row, or a regression's value; with --add-up the verdict so far. With --sequence-column evidence begins where a sequence does, and nothing more is said of one after its verdict; without it the row after a verdict is the first of another object, and a promise is for the first verdict alone.
+
+Examples:
+  palpate rows recognize model.palpate rows.csv --json
+  palpate rows recognize a.palpate a.csv --add-up --sequence-column id")]
+pub(super) struct Arguments {
+    /// Model that `palpate export` wrote
+    model: PathBuf,
+    /// Rows of features; - is standard input
+    #[arg(default_value = "-")]
+    rows: PathBuf,
+    /// Add up the evidence of rows, until there is a verdict
+    #[arg(long)]
+    add_up: bool,
+    /// Column that says which rows are one sequence
+    #[arg(long, value_name = "COL")]
+    sequence_column: Option<String>,
+    /// The share of wrong names to accept, such as 1%; stops there [default: the model's own thresholds]
+    #[arg(long, value_name = "RATE", value_parser = error_rate)]
+    error_rate: Option<f64>,
+    /// Give up after this many rows [default: the model's own limit]
+    #[arg(long, value_name = "N")]
+    max_rows: Option<u32>,
+    #[command(flatten)]
+    expected: ExpectedArguments,
+}
 
 /// Answer to a row.
 #[derive(serde::Serialize)]
@@ -42,19 +84,8 @@ struct Line<'a> {
     refused: Option<String>,
 }
 
-/// Options for rows.
-pub(super) struct Asked<'a> {
-    /// True if evidence is added up: a verdict, of a row and those before it since the last verdict.
-    pub(super) adds_up: bool,
-    /// The column of the sequences, if it is added up within these.
-    pub(super) sequence: Option<&'a str>,
-    pub(super) json: bool,
-    /// Frequencies of the classes, if they are not the model's.
-    pub(super) weights: Option<Vec<u32>>,
-}
-
 /// Name of a verdict in results.
-pub(super) fn verdict_name(verdict: Verdict) -> &'static str {
+pub(in crate::commands) fn verdict_name(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Undecided => "undecided",
         Verdict::Recognized { .. } => "recognized",
@@ -64,7 +95,7 @@ pub(super) fn verdict_name(verdict: Verdict) -> &'static str {
 }
 
 /// Starts a recognizer again, with these weights if there are any.
-pub(super) fn reset(recognizer: &mut Recognizer<'_, 256>, weights: Option<&[u32]>) {
+pub(in crate::commands) fn reset(recognizer: &mut Recognizer<'_, 256>, weights: Option<&[u32]>) {
     match weights {
         // One of them is above 0.
         Some(weights) => _ = recognizer.reset_to(weights),
@@ -73,23 +104,35 @@ pub(super) fn reset(recognizer: &mut Recognizer<'_, 256>, weights: Option<&[u32]
 }
 
 /// Prints the class or the value of each row, or the verdict so far.
-pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, asked: &Asked<'_>) -> Result<()> {
-    let &Asked { adds_up, sequence, json, ref weights } = asked;
-    let mut recognizer = recognizer;
+pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
+    let compiled = kinds::compiled(&arguments.model, ModelKind::Rows, "recognize")?;
+    let model = compiled.model();
+    let stopping = stopping(&model, arguments.error_rate, arguments.max_rows)?;
+    let recognizer = Recognizer::<256>::new(&model, stopping);
+    let recognizer = recognizer.map_err(|error| too_many_objects(error).in_file(&arguments.model))?;
+    let weights = arguments.expected.weights(&compiled.names(), &evaluate::own_weights(&model))?;
+    recognize(recognizer, weights.as_deref(), arguments, global.json)
+}
+
+fn recognize(
+    mut recognizer: Recognizer<'_, 256>,
+    weights: Option<&[u32]>,
+    arguments: &Arguments,
+    json: bool,
+) -> Result<()> {
+    let (adds_up, sequence) = (arguments.add_up, arguments.sequence_column.as_deref());
     let model = *recognizer.model();
-    if model.descriptor().is_some() {
-        return Err(over_touches());
-    }
-    let path = if path.as_os_str() == "-" { Path::new("/dev/stdin") } else { path };
+    let is_standard_input = arguments.rows.as_os_str() == "-";
+    let path = if is_standard_input { Path::new("/dev/stdin") } else { &arguments.rows };
     let features = if adds_up { Features::measured(&model) } else { Features::from(&model) };
     let rows = read_rows(path, features, sequence)?;
     let starts = starts(&rows.labels).map_err(|error| error.in_file(path))?;
     if let Some(promise) = model.promise().filter(|_| adds_up && sequence.is_none()) {
-        super::remark(&format!(
+        crate::commands::remark(&format!(
             "palpate: note: {}: nothing says where a sequence ends (--sequence-column), so the promise of {} % is for the first \
              verdict alone, and none is made for those after it",
             path.display(),
-            super::percent(promise.rate)
+            crate::commands::percent(promise.rate)
         ));
     }
     let encoder = if adds_up { Encoder::measured(&model) } else { Encoder::of(&model) };
@@ -106,7 +149,7 @@ pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, asked: &Asked<'_
             continue;
         }
         if is_first || !adds_up {
-            reset(&mut recognizer, weights.as_deref());
+            reset(&mut recognizer, weights);
             seen.reset();
         }
         // Of a row by itself all features are given.
@@ -154,7 +197,7 @@ fn starts(ids: &[String]) -> Result<BTreeSet<usize>> {
 
 fn print(line: &Line<'_>, json: bool) -> Result<()> {
     if json {
-        return super::print_line(line);
+        return crate::commands::print_line(line);
     }
     let row = line.row;
     let sequence = line.sequence.map_or_else(String::new, |sequence| format!("  {sequence}"));

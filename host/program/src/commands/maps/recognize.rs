@@ -1,15 +1,45 @@
-//! `palpate recognize` with a model of maps: objects with their place on a table.
+//! `palpate maps recognize`: objects with their place on a table.
 
-use super::Global;
-use super::expected::ExpectedArguments;
-use super::recognize_lines::{Event, Line, each_of};
-use super::recognize_rows::verdict_name;
+use crate::commands::expected::ExpectedArguments;
+use crate::commands::numbers::error_rate;
+use crate::commands::recognize_lines::{Event, Line, each_of};
+use crate::commands::rows::verdict_name;
+use crate::commands::{Global, kinds};
 use palpate::error::Kind;
-use palpate::locate::{self, Approach, Hand, Locating, Maps, MapsFile, POSE, Pose};
+use palpate::locate::{self, Approach, Hand, Locating, Maps, POSE, Pose};
 use palpate::output;
 use palpate::{Error, Result, compile};
 use palpate_onboard::{Stopping, Verdict};
-use std::path::Path;
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Each line in is a touch with the hand's position, straight down: twelve columns. Each line out is the verdict so far; with --next it is a JSON object with the place and the next approach, so that a robot's program can close the loop. After a verdict, and after an empty line, the next touch is the first of another object. The first approach to each object is at x = y = 0, with the row in any direction. FILE may be a robot's log (MCAP) as well.
+
+Examples:
+  robot | palpate maps recognize maps.palpate --next
+  palpate maps recognize maps.palpate touches.txt --only bowl,mug")]
+pub(super) struct Arguments {
+    /// Model of maps
+    model: PathBuf,
+    /// File with touches, or a robot's log (MCAP); - is standard input
+    #[arg(default_value = "-")]
+    file: PathBuf,
+    /// The share of wrong names to accept, such as 1%; stops there [default: the model's own thresholds]
+    #[arg(long, value_name = "RATE", value_parser = error_rate)]
+    error_rate: Option<f64>,
+    /// Give up after this many touches [default: the model's own limit]
+    #[arg(long, value_name = "N")]
+    max_touches: Option<u32>,
+    /// Say after each touch where to touch next
+    #[arg(long)]
+    next: bool,
+    /// Keep the middle finger this close to the table's origin, in x and y [default: twice the maps' range]
+    #[arg(long, value_name = "MM", requires = "next")]
+    workspace: Option<f64>,
+    #[command(flatten)]
+    expected: ExpectedArguments,
+}
 
 /// Verdict and place after a touch.
 #[derive(serde::Serialize)]
@@ -42,7 +72,7 @@ struct Mode<'m> {
 
 /// An approach straight down: the place of the middle finger in millimeters, and the row's angle from the x axis in degrees.
 #[derive(serde::Serialize)]
-pub(super) struct Next {
+pub(in crate::commands) struct Next {
     x: f64,
     y: f64,
     roll: f64,
@@ -82,7 +112,7 @@ impl From<Approach> for Next {
 }
 
 /// Prints verdict, place and next approach after a touch, of placements with these names.
-pub(super) fn print_located<'m>(
+pub(in crate::commands) fn print_located<'m>(
     line: Line<'m>,
     poses: Vec<Pose>,
     next: Option<Approach>,
@@ -100,36 +130,25 @@ pub(super) fn print_located<'m>(
     ))
 }
 
-/// Settings of a recognition, as they were given.
-pub(super) struct Asked<'a> {
-    pub(super) error_rate: Option<f64>,
-    pub(super) max_touches: Option<u32>,
-    pub(super) expected: &'a ExpectedArguments,
-    /// Places and the next approach are printed.
-    pub(super) next: bool,
-    /// See [`locate::workspace`].
-    pub(super) workspace: Option<f64>,
-}
-
-/// Recognizes objects by touches with a position, from a file.
-pub(super) fn run(file: &MapsFile, touches: &Path, asked: &Asked<'_>, global: &Global) -> Result<()> {
+pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
+    let file = kinds::maps(&arguments.model, "recognize")?;
     let maps = file.maps();
     let own = maps.stopping();
-    let max_touches = asked.max_touches.unwrap_or(own.max_touches());
+    let max_touches = arguments.max_touches.unwrap_or(own.max_touches());
     if !(1..=locate::TOUCHES as u32).contains(&max_touches) {
         return Err(Error::setting("max_touches", max_touches, format!("1 to {}", locate::TOUCHES)));
     }
-    let stopping = match asked.error_rate {
+    let stopping = match arguments.error_rate {
         Some(rate) => compile::stopping(rate, max_touches)?,
         None => own.with_max_touches(max_touches),
     };
     let names = locate::names(&maps);
-    let weights = asked.expected.weights(&names, &vec![1.0; names.len()])?;
+    let weights = arguments.expected.weights(&names, &vec![1.0; names.len()])?;
     let hand = Hand::of(&maps).ok_or_else(locate::no_hand)?;
-    let within = locate::workspace(&maps, asked.workspace)?;
-    let mut stream = Stream::new(maps, hand, stopping, weights, asked.next.then_some(within), global);
+    let within = locate::workspace(&maps, arguments.workspace)?;
+    let mut stream = Stream::new(maps, hand, stopping, weights, arguments.next.then_some(within), global);
     stream.begin();
-    each_of(touches, &mut |event| stream.take(event))
+    each_of(&arguments.file, &mut |event| stream.take(event))
 }
 
 /// A stream of touches and what locates by them.

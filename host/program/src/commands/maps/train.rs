@@ -1,12 +1,13 @@
-//! `palpate maps`: height maps of objects on a table.
+//! `palpate maps train`.
 
-use super::Global;
-use super::capture::complain;
-use super::keys::pairs;
-use super::probe::{SizeArguments, refuse_unstated};
-use super::progress::{Bar, cancel_when_interrupted};
-use super::real::RealArguments;
-use super::teach::RecordedArguments;
+use super::name;
+use crate::commands::Global;
+use crate::commands::capture::complain;
+use crate::commands::keys::pairs;
+use crate::commands::probe::{SizeArguments, refuse_unstated};
+use crate::commands::progress::{Bar, cancel_when_interrupted};
+use crate::commands::real::RealArguments;
+use crate::commands::teach::RecordedArguments;
 use palpate::locate::{self, Maps, Real, Settings, Standing, Surface};
 use palpate::output;
 use palpate::probe::noise::Noise;
@@ -21,21 +22,8 @@ use std::str::FromStr;
 use std::time::Instant;
 
 #[derive(clap::Args)]
-#[command(arg_required_else_help = true, subcommand_required = true)]
-pub(crate) struct Arguments {
-    #[command(subcommand)]
-    command: Command,
-}
-
-#[derive(clap::Subcommand)]
-enum Command {
-    /// Make height maps of objects, from meshes or recorded touches
-    Train(Box<TrainArguments>),
-}
-
-#[derive(clap::Args)]
 #[command(after_help = "\
-The maps say what a fingertip that comes straight down meets on each object in each pose that it rests in: a model for `palpate calibrate --objects` and `palpate recognize`. Meshes keep their true size. Touches of --teach need a position.
+The maps say what a fingertip that comes straight down meets on each object in each pose that it rests in: a model for the other commands of `palpate maps`. Meshes keep their true size. Touches of --teach need a position.
 
 Keys of --maps: cell, range, noise, lost, position, drift; docs/reference/options.md explains them.
 
@@ -45,7 +33,7 @@ Examples:
       --real noise=5ms,missed=2% --maps cell=2mm
   palpate maps train meshes/ -o maps.palpate --probe hand.toml --teach pot.txt
   palpate maps train --teach recorded -o maps.palpate")]
-struct TrainArguments {
+pub(super) struct Arguments {
     /// Objects: `builtin` or built-in objects' names, meshes (OBJ, STL, PLY, glTF, COLLADA), directories of them
     #[arg(value_name = "SOURCE", required_unless_present = "teach")]
     sources: Vec<String>,
@@ -65,7 +53,7 @@ struct TrainArguments {
 
 /// Settings of maps, as one text; those that are left open are those of the noise.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct MapSettings {
+pub(super) struct MapSettings {
     fine: Option<bool>,
     /// Lengths in micrometers.
     range: Option<f64>,
@@ -168,14 +156,9 @@ struct OfPlacement<'m> {
     bytes: usize,
 }
 
-pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
-    let Command::Train(arguments) = arguments.command;
-    train(*arguments, global)
-}
-
 /// Makes maps of meshes, and of recorded touches with a position.
-fn train(arguments: TrainArguments, global: &Global) -> Result<()> {
-    let TrainArguments { sources, recorded, output, maps, mut size, real } = arguments;
+pub(super) fn run(arguments: Arguments, global: &Global) -> Result<()> {
+    let Arguments { sources, recorded, output, maps, mut size, real } = arguments;
     let files = recorded.files();
     output::admit(&output, files.iter().cloned().chain(sources.iter().map(PathBuf::from)))?;
     let start = Instant::now();
@@ -287,11 +270,6 @@ fn text(output: &Path, trained: &Trained<'_>) -> String {
         _ = writeln!(text, "left out, since they are rare: {}", rare.join(", "));
     }
     text
-}
-
-/// The name of a placement with that of its object.
-pub(super) fn name(object: &str, placement: &str) -> String {
-    if placement.is_empty() { object.to_owned() } else { format!("{object}/{placement}") }
 }
 
 #[cfg(test)]

@@ -1,0 +1,121 @@
+//! Kinds of models, and the commands that take them.
+
+use palpate::compile::CompiledModel;
+use palpate::error::{Error, Place, Result, problem};
+use palpate::evaluate::model_file::ModelFile;
+use palpate::locate::MapsFile;
+use std::path::Path;
+
+/// The evidence that a model recognizes by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum ModelKind {
+    Touches,
+    Rows,
+    Maps,
+}
+
+impl ModelKind {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Touches => "touches",
+            Self::Rows => "rows",
+            Self::Maps => "maps",
+        }
+    }
+
+    /// The command called `name` for models of this kind, such as `rows evaluate`.
+    fn command(self, name: &str) -> String {
+        match self {
+            Self::Touches => name.into(),
+            Self::Rows | Self::Maps => format!("{} {name}", self.name()),
+        }
+    }
+}
+
+/// Reads a compiled model for a command that takes models of trees of one kind.
+pub(super) fn compiled(path: &Path, wanted: ModelKind, command: &str) -> Result<CompiledModel> {
+    refuse_maps(path, wanted, command)?;
+    let compiled = CompiledModel::read(path)?;
+    check(path, of_trees(compiled.model().descriptor().is_some()), wanted, command)?;
+    Ok(compiled)
+}
+
+/// Reads a compiled model or an ensemble for a command that takes those of one kind.
+pub(super) fn file(path: &Path, wanted: ModelKind, command: &str) -> Result<ModelFile> {
+    refuse_maps(path, wanted, command)?;
+    let file = ModelFile::load(path)?;
+    let has_rows = file.with(|candidate| Ok(candidate.is_of_rows()))?;
+    check(path, of_trees(!has_rows), wanted, command)?;
+    Ok(file)
+}
+
+/// Reads a model of maps.
+pub(super) fn maps(path: &Path, command: &str) -> Result<MapsFile> {
+    if let Some(maps) = MapsFile::read(path)? {
+        return Ok(maps);
+    }
+    // If the file holds no trees either, its own error says why.
+    let compiled = CompiledModel::read(path)?;
+    Err(other(path, of_trees(compiled.model().descriptor().is_some()), ModelKind::Maps, command))
+}
+
+fn of_trees(has_touches: bool) -> ModelKind {
+    if has_touches { ModelKind::Touches } else { ModelKind::Rows }
+}
+
+fn refuse_maps(path: &Path, wanted: ModelKind, command: &str) -> Result<()> {
+    let is_of_maps = MapsFile::read(path)?.is_some();
+    if is_of_maps { Err(other(path, ModelKind::Maps, wanted, command)) } else { Ok(()) }
+}
+
+fn check(path: &Path, found: ModelKind, wanted: ModelKind, command: &str) -> Result<()> {
+    if found == wanted { Ok(()) } else { Err(other(path, found, wanted, command)) }
+}
+
+/// The problem of a model of another kind, with the command that takes it, if there is one.
+fn other(path: &Path, found: ModelKind, wanted: ModelKind, command: &str) -> Error {
+    let taking = found.command(command);
+    let fix = match super::at(&super::cli(), &taking) {
+        Some(_) => format!("Use `palpate {taking}`."),
+        None => format!("Give a model of {}.", wanted.name()),
+    };
+    problem!("a model of {}, not of {}", found.name(), wanted.name()).fix(fix).at(Place::file(path))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_model_of_another_kind_is_refused_with_the_command_that_takes_it() {
+        let said = |found, wanted, command| other(Path::new("m"), found, wanted, command).to_string();
+        for (found, wanted, command, expected) in [
+            (
+                ModelKind::Maps,
+                ModelKind::Touches,
+                "recognize",
+                "m: a model of maps, not of touches. Use `palpate maps recognize`.",
+            ),
+            (
+                ModelKind::Rows,
+                ModelKind::Touches,
+                "evaluate",
+                "m: a model of rows, not of touches. Use `palpate rows evaluate`.",
+            ),
+            (
+                ModelKind::Touches,
+                ModelKind::Maps,
+                "calibrate",
+                "m: a model of touches, not of maps. Use `palpate calibrate`.",
+            ),
+            (
+                ModelKind::Rows,
+                ModelKind::Touches,
+                "plan",
+                "m: a model of rows, not of touches. Give a model of touches.",
+            ),
+        ] {
+            assert_eq!(said(found, wanted, command), expected);
+        }
+    }
+}
