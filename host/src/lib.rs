@@ -130,7 +130,7 @@ extern crate self as palpate;
 
 pub use error::{Error, Result};
 pub use glam;
-pub use palpate_base::{gone, output, progress, with, wording};
+pub use palpate_base::{gone, output, progress, results, row, with, wording};
 pub use palpate_onboard as onboard;
 pub use palpate_shared as shared;
 pub use palpate_simulator::{self as simulator, in_order, mesh, probe, random};

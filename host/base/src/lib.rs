@@ -6,6 +6,7 @@
 //! | [`gone`] | what earlier versions had, and what to use instead | [`gone::instead`] |
 //! | [`output`] | files and directories that appear whole or not at all | [`output::write_whole`] |
 //! | [`progress`] | progress of long calls, and a way to cancel them | [`progress::Progress`] |
+//! | [`results`] | rows of values: text, JSON, a page's table | [`results::Results`] |
 //! | [`wording`] | numbers as people read them | [`wording::decimal`] |
 //!
 //! The crates `palpate-trees`, `palpate-simulator` and `palpate` build on this one and re-export it.
@@ -14,6 +15,7 @@ pub mod error;
 pub mod gone;
 pub mod output;
 pub mod progress;
+pub mod results;
 pub mod wording;
 
 pub use error::{Error, Result};

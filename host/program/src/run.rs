@@ -532,7 +532,7 @@ mod tests {
         assert_eq!(approaches.len(), 3, "{text}");
         assert!(summary.recognized.iter().all(|recognition| recognition.approaches >= recognition.touches as usize));
         let undecided = evaluation.approaches.as_ref().unwrap().sequential.undecided;
-        assert_eq!(row(&text, "undecided when touches ran out")[1], format!("{:.2}\u{a0}%", 100.0 * undecided));
+        assert_eq!(row(&text, "undecided when touches ran out")[1], format!("{:.2} %", 100.0 * undecided));
         assert!(text.contains("fewer than 300 distinct groups"), "{text}");
 
         let page = std::fs::read_to_string(out.join("report.html")).unwrap();

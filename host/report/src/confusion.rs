@@ -1,17 +1,35 @@
 //! Confusion matrices: which object is recognized as which.
 
-use crate::page::chart::Svg;
+use crate::page::document::Figure;
 use crate::page::heat_map::heat_map;
-use crate::page::table::{Cell, Records};
 use palpate::error::Result;
+use palpate::results::{Results, Value};
+use palpate::row;
 use plotters::style::RGBColor;
 
-/// The matrix drawn: row by row the object that was touched, column by column the one recognized.
+/// A method's confusion: its name in the data, its title in the drawing, its color, and shares of each row.
+pub(super) type Method<'a> = (&'a str, &'a str, RGBColor, Vec<Vec<f64>>);
+
+/// The figure of several methods' matrices: row by row the object that was touched, column by column the one recognized.
 ///
 /// # Errors
-/// If the chart cannot be drawn.
-pub(super) fn drawn(title: &str, names: &[String], shares: &[Vec<f64>], color: RGBColor) -> Result<Svg> {
-    heat_map(title, ["recognized as", "touched"], names, shares, color)
+/// If a chart cannot be drawn.
+pub(super) fn figure<'a>(
+    [id, title, caption]: [&str; 3],
+    names: &[String],
+    methods: impl Iterator<Item = Method<'a>>,
+) -> Result<Figure> {
+    let mut data = Results::new(["method", "touched", "recognized as", "share"]);
+    let mut panels = Vec::new();
+    for (method, title, color, shares) in methods {
+        panels.push(heat_map(title, ["recognized as", "touched"], names, &shares, color)?);
+        for (touched, row) in names.iter().zip(&shares) {
+            for (taken, &share) in names.iter().zip(row) {
+                data.push(row![method, touched, taken, Value::Percent(share, 1)]);
+            }
+        }
+    }
+    Ok(Figure::new(id, title, caption, data).drawn(panels))
 }
 
 /// The sum of matrices of counts, as shares of each row.
@@ -35,13 +53,10 @@ pub(super) fn recall_precision(shares: &[Vec<f64>]) -> Vec<(f64, f64)> {
     (0..shares.len()).map(of).collect()
 }
 
-/// Adds a matrix of shares to a figure's data, one row per cell.
-pub(super) fn push_matrix(data: &mut Records, method: &str, names: &[String], shares: &[Vec<f64>]) {
-    for (touched, row) in names.iter().zip(shares) {
-        for (taken, &share) in names.iter().zip(row) {
-            data.push([method.into(), touched.as_str().into(), taken.as_str().into(), Cell::Percent(share, 1)]);
-        }
-    }
+/// Means of recall and of precision over objects.
+pub(super) fn mean(of_objects: &[(f64, f64)]) -> (f64, f64) {
+    let mean = |of: fn(&(f64, f64)) -> f64| of_objects.iter().map(of).sum::<f64>() / of_objects.len().max(1) as f64;
+    (mean(|pair| pair.0), mean(|pair| pair.1))
 }
 
 #[cfg(test)]

@@ -7,13 +7,13 @@ use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Mark, Shape, Stroke};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
-use crate::page::table::{Cell, Records, Table};
 use palpate::compile::{self, Leaf};
 use palpate::ensemble::{Ensemble, OverTouches};
 use palpate::error::Result;
 use palpate::evaluate::{Candidate, Margins, parity};
-use palpate::with;
+use palpate::results::{Results, Value};
 use palpate::wording::count;
+use palpate::{row, with};
 use palpate_onboard::Model;
 use palpate_shared::Touch;
 use std::time::Instant;
@@ -157,40 +157,29 @@ fn frontier(members: &[Member]) -> Vec<&Member> {
 }
 
 /// The figure and the table.
-pub(super) fn section(context: &Context, members: &[Member]) -> Result<Section> {
+pub(super) fn section(members: &[Member]) -> Result<Section> {
     let mut section = Section::new("cost", "Speed against error");
     section.text(format!(
         "A family of models, trained on the first fold and tested on the large capture. Nanoseconds are of this machine, \
          one thread. {}",
         members.first().map_or_else(String::new, |member| member.instructions.explanation())
     ));
-    section.figure(figure(context, members, "cost-bytes", "bytes", |member| member.bytes as f64)?);
-    section.figure(figure(context, members, "cost-time", "nanoseconds per touch, this machine", |m| m.nanoseconds)?);
-    section.figure(figure(
-        context,
-        members,
-        "cost-work",
-        &format!("instructions per touch, Cortex-M4F ({})", sources(members)[0]),
-        |m| m.instructions.m4f.number as f64,
-    )?);
-    section.table(table(context, members));
+    section.figure(figure(members, "cost-bytes", "bytes", |member| member.bytes as f64)?);
+    section.figure(figure(members, "cost-time", "nanoseconds per touch, this machine", |member| member.nanoseconds)?);
+    let unit = format!("instructions per touch, Cortex-M4F ({})", sources(members)[0]);
+    section.figure(figure(members, "cost-work", &unit, |member| member.instructions.m4f.number as f64)?);
+    section.figure(table(members));
     Ok(section)
 }
 
-fn figure(
-    context: &Context,
-    members: &[Member],
-    id: &str,
-    unit: &str,
-    cost: impl Fn(&Member) -> f64,
-) -> Result<Figure> {
+fn figure(members: &[Member], id: &str, unit: &str, cost: impl Fn(&Member) -> f64) -> Result<Figure> {
     let all = || members.iter().map(&cost);
     let low = members.iter().map(|member| member.at_10).fold(1.0, f64::min);
     let high = members.iter().map(|member| member.at_10).fold(0.0, f64::max);
     let x = Axis::logarithmic(all().fold(f64::INFINITY, f64::min) * 0.7, all().fold(0.0, f64::max) * 1.6);
     let y = Axis::percent((low * 20.0).floor() / 20.0, (((high + 0.02) * 20.0).ceil() / 20.0).min(1.0));
     let mut chart = Chart::new(unit, x, "accuracy after 10 touches", y).sized(660, 400);
-    let mut data = Records::new(["model", "leaf", unit, "accuracy after 10 touches"]);
+    let mut data = Results::new(["model", "leaf", unit, "accuracy after 10 touches"]);
     let mut by_cost: Vec<&Member> = members.iter().collect();
     by_cost.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
     let mut best = f64::NEG_INFINITY;
@@ -226,24 +215,11 @@ fn figure(
             chart.marks.push(Mark::Note { at, text: text.clone(), color });
             named.push(text);
         }
-        data.push([
-            member.name.as_str().into(),
-            member.leaf.as_str().into(),
-            Cell::Number(at.0, 1),
-            Cell::Percent(at.1, 2),
-        ]);
+        data.push(row![&member.name, &member.leaf, Value::Number(at.0, 1), Value::Percent(at.1, 2)]);
     }
-    Ok(Figure {
-        id: id.into(),
-        title: format!("Accuracy against {unit}"),
-        caption:
-            "Dashed: the frontier, the best accuracy up to each cost. Points are named where there is room; the table \
-                  below has all of them."
-                .into(),
-        command: context.settings.command.clone(),
-        panels: vec![chart.svg()?],
-        data,
-    })
+    let caption = "Dashed: the frontier, the best accuracy up to each cost. Points are named where there is room; the table below \
+                   has all of them.";
+    Ok(Figure::new(id, format!("Accuracy against {unit}"), caption, data).drawn(vec![chart.svg()?]))
 }
 
 /// Sources of the instructions on a Cortex-M4F and on a Cortex-M0+.
@@ -253,10 +229,10 @@ fn sources(members: &[Member]) -> [&'static str; 2] {
     })
 }
 
-fn table(context: &Context, members: &[Member]) -> Table {
+fn table(members: &[Member]) -> Figure {
     let [m4f, m0_plus] = sources(members);
     let chips = [("M4F", m4f), ("M0+", m0_plus)].map(|(chip, source)| format!("instructions, {chip} ({source})"));
-    let mut data = Records::new([
+    let mut data = Results::new([
         "model",
         "frontier",
         "leaf",
@@ -275,35 +251,26 @@ fn table(context: &Context, members: &[Member]) -> Table {
     let best = frontier(members);
     for member in members {
         let on = best.iter().any(|other| std::ptr::eq(*other, member));
-        data.push([
-            member.name.as_str().into(),
-            Cell::from(if on { "yes" } else { "" }),
-            member.leaf.as_str().into(),
-            Cell::count(member.bytes),
-            Cell::Number(member.nanoseconds, 0),
-            Cell::count(member.instructions.m4f.number),
-            Cell::count(member.instructions.m0_plus.number),
-            member.code.map_or(Cell::Missing, |code| Cell::count(code.bytes)),
-            member.code.map_or(Cell::Missing, |code| Cell::count(code.instructions)),
-            Cell::Number(member.margin_error, 5),
-            Cell::Number(member.stated_error, 5),
-            Cell::Percent(member.at_10, 1),
-            Cell::Percent(member.at_30, 1),
-            member.to_1_percent.map_or(Cell::Missing, Cell::count),
+        data.push(row![
+            &member.name,
+            if on { "yes" } else { "" },
+            &member.leaf,
+            member.bytes,
+            Value::Number(member.nanoseconds, 0),
+            member.instructions.m4f.number,
+            member.instructions.m0_plus.number,
+            member.code.map(|code| code.bytes),
+            member.code.map(|code| code.instructions),
+            Value::Number(member.margin_error, 5),
+            Value::Number(member.stated_error, 5),
+            Value::Percent(member.at_10, 1),
+            Value::Percent(member.at_30, 1),
+            member.to_1_percent,
         ]);
     }
-    Table {
-        id: "cost".into(),
-        title: "The family".into(),
-        caption: format!(
-            "The frontier is of bytes and accuracy after ten touches{}.",
-            best.first().map_or_else(String::new, |member| {
-                format!("; the smallest model on it has {} bytes", count(member.bytes))
-            })
-        ),
-        command: context.settings.command.clone(),
-        data,
-    }
+    let smallest = best.first().map(|member| format!("; the smallest model on it has {} bytes", count(member.bytes)));
+    let caption = format!("The frontier is of bytes and accuracy after ten touches{}.", smallest.unwrap_or_default());
+    Figure::new("cost", "The family", caption, data)
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Cross-validation: accuracy against the number of touches, and confusion (the paper's figures 8 and 9).
 
-use super::confusion::{self, normalized, recall_precision};
+use super::confusion::{self, mean, normalized, recall_precision};
 use super::context::{Context, compiled, compiled_f32};
 use super::run_page::method_style;
 use super::statistics::{LEAST_GROUPS, largest_group, mean_deviation};
@@ -8,11 +8,12 @@ use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Mark, Stroke};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
-use crate::page::table::{Cell, Records, Table};
 use palpate::compile;
 use palpate::ensemble::train;
 use palpate::error::Result;
 use palpate::evaluate::{Candidate, Margins};
+use palpate::results::{Results, Value};
+use palpate::row;
 use palpate::wording::{count, counted};
 use std::time::Instant;
 
@@ -119,7 +120,7 @@ pub(super) fn section(context: &Context, folds: &[Fold]) -> Result<Section> {
     section.figure(overall(context, folds)?);
     section.figure(objects(context, folds)?);
     section.figure(confusions(context, folds)?);
-    section.table(recall(context, folds));
+    section.figure(recall(context, folds));
     Ok(section)
 }
 
@@ -132,7 +133,7 @@ fn overall(context: &Context, folds: &[Fold]) -> Result<Figure> {
     let levels = context.settings.levels();
     let mut chart =
         Chart::new("touches", Axis::logarithmic(10.0, 120.0), "accuracy", Axis::percent(0.4, 1.0)).sized(620, 400);
-    let mut data = Records::new(["method", "touches", "accuracy", "accuracy, many groups"]);
+    let mut data = Results::new(["method", "touches", "accuracy", "accuracy, many groups"]);
     for (index, name) in METHODS.iter().enumerate() {
         let (color, shape) = method_style(index);
         let mut points = Vec::new();
@@ -142,35 +143,25 @@ fn overall(context: &Context, folds: &[Fold]) -> Result<Figure> {
             let (many, many_deviation) = over_folds(folds, |fold| fold.methods[index].many.get(n - 1).copied());
             points.push((n as f64, mean));
             spread.push((n as f64, mean - deviation, (mean + deviation).min(1.0)));
-            data.push([
-                (*name).into(),
-                Cell::count(n),
-                Cell::PercentSpread(mean, deviation, 1),
-                Cell::PercentSpread(many, many_deviation, 1),
-            ]);
+            let many = Value::PercentSpread(many, many_deviation, 1);
+            data.push(row![*name, n, Value::PercentSpread(mean, deviation, 1), many]);
         }
         chart.marks.push(Mark::Spread { points: spread, color });
         chart.series(name, color, shape, &points);
     }
-    Ok(Figure {
-        id: "accuracy".into(),
-        title: "Groups recognized, mean over folds (the paper's figure 8a)".into(),
-        caption: format!(
-            "Bars are one standard deviation over folds, of {} groups per object. The CSV also has the same over {} \
-             groups per object. A dash (–) means that an object's test touches make fewer than {LEAST_GROUPS} distinct \
-             groups.",
-            context.settings.groups, context.settings.many_groups
-        ),
-        command: context.settings.command.clone(),
-        panels: vec![chart.svg()?],
-        data,
-    })
+    let caption = format!(
+        "Bars are one standard deviation over folds, of {} groups per object. The CSV also has the same over {} groups per object. A \
+         dash (–) means that an object's test touches make fewer than {LEAST_GROUPS} distinct groups.",
+        context.settings.groups, context.settings.many_groups
+    );
+    let title = "Groups recognized, mean over folds (the paper's figure 8a)";
+    Ok(Figure::new("accuracy", title, caption, data).drawn(vec![chart.svg()?]))
 }
 
 fn objects(context: &Context, folds: &[Fold]) -> Result<Figure> {
     let levels = context.settings.levels();
     let mut panels = Vec::new();
-    let mut data = Records::new(["object", "method", "touches", "accuracy"]);
+    let mut data = Results::new(["object", "method", "touches", "accuracy"]);
     for (position, name) in context.names().iter().enumerate() {
         let mut chart = Chart::new("touches", Axis::logarithmic(10.0, 120.0), "", Axis::share())
             .sized(270, 200)
@@ -182,56 +173,32 @@ fn objects(context: &Context, folds: &[Fold]) -> Result<Figure> {
                 let of = |fold: &Fold| fold.methods[index].few_of_object[position].get(n - 1).copied();
                 let (mean, deviation) = over_folds(folds, of);
                 points.push((n as f64, mean));
-                data.push([
-                    name.as_str().into(),
-                    (*method).into(),
-                    Cell::count(n),
-                    Cell::PercentSpread(mean, deviation, 1),
-                ]);
+                data.push(row![name, *method, n, Value::PercentSpread(mean, deviation, 1)]);
             }
             let stroke = if index == 0 { Stroke::Dashed } else { Stroke::Solid };
             chart.line(method, color, stroke, &points);
         }
         panels.push(chart.svg()?);
     }
-    Ok(Figure {
-        id: "accuracy-objects".into(),
-        title: "The same for each object (figure 8b)".into(),
-        caption: "Mean over folds; the CSV has the standard deviations.".into(),
-        command: context.settings.command.clone(),
-        panels,
-        data,
-    })
+    let caption = "Mean over folds; the CSV has the standard deviations.";
+    Ok(Figure::new("accuracy-objects", "The same for each object (figure 8b)", caption, data).drawn(panels))
 }
 
 fn confusions(context: &Context, folds: &[Fold]) -> Result<Figure> {
-    let names = context.names();
-    let mut data = Records::new(["method", "touched", "recognized as", "share"]);
-    let mut panels = Vec::new();
-    for (index, method) in METHODS.iter().enumerate() {
-        let shares = shares(folds, index);
-        let color = if index == 0 { color::PAPER } else { color::OURS };
-        let title = if index == 0 { "the paper's method" } else { "ours" };
-        panels.push(confusion::drawn(title, &names, &shares, color)?);
-        confusion::push_matrix(&mut data, method, &names, &shares);
-    }
-    Ok(Figure {
-        id: "confusion".into(),
-        title: "Confusion matrix after ten touches (figure 9)".into(),
-        caption: format!(
-            "Percentage of the groups of an object (row) that were recognized as another (column), all folds together, {} \
-             groups per object and fold, the same as those of the accuracy over many groups. Shares below half a percent are \
-             blank.",
-            count(context.settings.many_groups)
-        ),
-        command: context.settings.command.clone(),
-        panels,
-        data,
-    })
+    let caption = format!(
+        "Percentage of the groups of an object (row) that were recognized as another (column), all folds together, {} groups per \
+         object and fold, the same as those of the accuracy over many groups. Shares below half a percent are blank.",
+        count(context.settings.many_groups)
+    );
+    let drawn = [("the paper's method", color::PAPER), ("ours", color::OURS)];
+    let methods = METHODS.into_iter().zip(drawn).enumerate();
+    let methods = methods.map(|(index, (method, (title, color)))| (method, title, color, shares(folds, index)));
+    let title = "Confusion matrix after ten touches (figure 9)";
+    confusion::figure(["confusion", title, &caption], &context.names(), methods)
 }
 
-fn recall(context: &Context, folds: &[Fold]) -> Table {
-    let mut data = Records::new([
+fn recall(context: &Context, folds: &[Fold]) -> Figure {
+    let mut data = Results::new([
         "object",
         "recall, paper's method",
         "precision, paper's method",
@@ -239,27 +206,15 @@ fn recall(context: &Context, folds: &[Fold]) -> Table {
         "precision, ours",
     ]);
     let [paper, ours] = [0, 1].map(|method| recall_precision(&shares(folds, method)));
-    let percent = |value| Cell::Percent(value, 1);
-    for (position, name) in context.names().into_iter().enumerate() {
-        let (p, o) = (paper[position], ours[position]);
-        data.push([name.into(), percent(p.0), percent(p.1), percent(o.0), percent(o.1)]);
+    let mut push = |name: &str, (paper, ours): ((f64, f64), (f64, f64))| {
+        let [a, b, c, d] = [paper.0, paper.1, ours.0, ours.1].map(|share| Value::Percent(share, 1));
+        data.push(row![name, a, b, c, d]);
+    };
+    for (name, both) in context.names().iter().zip(paper.iter().copied().zip(ours.iter().copied())) {
+        push(name, both);
     }
-    let mean = |of: &dyn Fn(usize) -> f64| percent((0..paper.len()).map(of).sum::<f64>() / paper.len().max(1) as f64);
-    data.push([
-        "mean".into(),
-        mean(&|k| paper[k].0),
-        mean(&|k| paper[k].1),
-        mean(&|k| ours[k].0),
-        mean(&|k| ours[k].1),
-    ]);
-    Table {
-        id: "recall".into(),
-        title: "Recall and precision after ten touches".into(),
-        caption:
-            "From the matrices above. With equally many groups of each object, mean recall is the accuracy. Click a \
-                  heading to sort."
-                .into(),
-        command: context.settings.command.clone(),
-        data,
-    }
+    push("mean", (mean(&paper), mean(&ours)));
+    let caption = "From the matrices above. With equally many groups of each object, mean recall is the accuracy. Click a heading to \
+                   sort.";
+    Figure::new("recall", "Recall and precision after ten touches", caption, data)
 }

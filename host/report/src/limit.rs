@@ -8,14 +8,14 @@ use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Shape, Stroke};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
-use crate::page::table::{Cell, Records, Table};
 use palpate::compile;
 use palpate::ensemble::Ensemble;
 use palpate::error::Result;
 use palpate::evaluate::{Candidate, Margins};
+use palpate::results::{Results, Value};
 use palpate::touches::Dataset;
-use palpate::with;
 use palpate::wording::{count, decimal};
+use palpate::{row, with};
 use palpate_shared::Descriptor;
 
 /// The longest groups.
@@ -171,18 +171,18 @@ pub(super) fn section(context: &Context, limit: &Limit) -> Result<Section> {
         "The limit holds for the paper's descriptor too: the row of fingers is rolled at random, so a touch and its mirror \
          image are equally likely for every object, and the curvature descriptor keeps all but the mirror image.",
     );
-    section.figure(figure(context, limit)?);
-    section.table(table(context, limit));
+    section.figure(figure(limit)?);
+    section.figure(table(context, limit));
     Ok(section)
 }
 
-fn figure(context: &Context, limit: &Limit) -> Result<Figure> {
+fn figure(limit: &Limit) -> Result<Figure> {
     let mut chart =
         Chart::new("touches", Axis::logarithmic(1.0, MOST as f64), "accuracy", Axis::share()).sized(620, 400);
-    let mut data = Records::new(["model", "touches", "accuracy"]);
+    let mut data = Results::new(["model", "touches", "accuracy"]);
     for candidate in &limit.candidates {
         for (index, &accuracy) in candidate.curve.iter().enumerate() {
-            data.push([candidate.name.as_str().into(), Cell::count(index + 1), Cell::Percent(accuracy, 2)]);
+            data.push(row![&candidate.name, index + 1, Value::Percent(accuracy, 2)]);
         }
     }
     let points = |index: usize| -> Vec<(f64, f64)> {
@@ -193,19 +193,14 @@ fn figure(context: &Context, limit: &Limit) -> Result<Figure> {
     let few = |index| -> Vec<(f64, f64)> { marked.iter().map(|&n| points(index)[n - 1]).collect() };
     chart.series("ours", color::OURS, Shape::Disc, &few(OURS));
     chart.series("paper", color::PAPER, Shape::Ring, &few(PAPER));
-    Ok(Figure {
-        id: "limit-curves".into(),
-        title: "Accuracy against touches, and the best possible".into(),
-        caption: format!("{} groups per object, the same for all.", count(limit.groups)),
-        command: context.settings.command.clone(),
-        panels: vec![chart.svg()?],
-        data,
-    })
+    let caption = format!("{} groups per object, the same for all.", count(limit.groups));
+    let title = "Accuracy against touches, and the best possible";
+    Ok(Figure::new("limit-curves", title, caption, data).drawn(vec![chart.svg()?]))
 }
 
-fn table(context: &Context, limit: &Limit) -> Table {
+fn table(context: &Context, limit: &Limit) -> Figure {
     let columns = AT.iter().map(|n| format!("at {n}"));
-    let mut data = Records::new(
+    let mut data = Results::new(
         std::iter::once("model".to_string())
             .chain(columns)
             .chain(["behind the limit at 10 (points)".into(), "95 % interval".into()]),
@@ -213,21 +208,16 @@ fn table(context: &Context, limit: &Limit) -> Table {
     for (index, candidate) in limit.candidates.iter().enumerate() {
         let (gap, low, high) = limit.gap_at_10(index);
         let name = if index == limit.best { format!("{} (the limit)", candidate.name) } else { candidate.name.clone() };
-        let accuracies = AT.iter().map(|&n| Cell::Percent(candidate.curve[n - 1], 1));
-        let [low, high] = [low, high].map(|value| crate::page::axis::number(value * 100.0, 1));
-        let interval = if index == limit.best { Cell::Missing } else { format!("{low} to {high}").into() };
-        data.push(std::iter::once(name.into()).chain(accuracies).chain([Cell::Number(gap * 100.0, 1), interval]));
+        let accuracies = AT.iter().map(|&n| Value::Percent(candidate.curve[n - 1], 1));
+        let [low, high] = [low, high].map(|value| decimal(value * 100.0, 1));
+        let interval = (index != limit.best).then(|| format!("{low} to {high}"));
+        data.push(row![name].into_iter().chain(accuracies).chain(row![Value::Number(gap * 100.0, 1), interval]));
     }
-    Table {
-        id: "limit".into(),
-        title: "Gaps to the limit".into(),
-        caption: format!(
-            "Accuracies on the same {} groups per object; gaps are paired over groups. One standard error of an accuracy \
-             is at most {} points.",
-            count(limit.groups),
-            crate::page::axis::number(50.0 / ((limit.groups * context.objects.len()) as f64).sqrt(), 1)
-        ),
-        command: context.settings.command.clone(),
-        data,
-    }
+    let caption = format!(
+        "Accuracies on the same {} groups per object; gaps are paired over groups. One standard error of an accuracy is at most {} \
+         points.",
+        count(limit.groups),
+        decimal(50.0 / ((limit.groups * context.objects.len()) as f64).sqrt(), 1)
+    );
+    Figure::new("limit", "Gaps to the limit", caption, data)
 }

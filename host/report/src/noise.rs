@@ -1,22 +1,22 @@
 //! Noise on contact times: signal-to-noise ratio, accuracy and confusion (the paper's figures 10 to 13).
 
-use super::confusion::{self, normalized, push_matrix};
+use super::confusion::{self, normalized};
 use super::context::{Context, Models, NOISE, compiled, compiled_f32};
 use super::statistics::{mean_deviation, savitzky_golay, wilson};
 use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Mark, Shape, Stroke};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
-use crate::page::table::{Cell, Records, Table};
 use palpate::compile;
 use palpate::ensemble::train;
 use palpate::error::Result;
 use palpate::evaluate::{Candidate, Margins, add_noise};
 use palpate::probe::noise::{self, Noise};
+use palpate::results::{Results, Value};
 use palpate::touches::folds::Split;
 use palpate::touches::{Dataset, ObjectTouches};
-use palpate::with;
 use palpate::wording::{count, counted};
+use palpate::{row, with};
 use plotters::style::RGBColor;
 
 /// The methods, in the order of [`Fold::methods`].
@@ -166,29 +166,23 @@ pub(super) fn section(context: &Context, folds: &[Fold]) -> Result<Section> {
     section.figure(overall(context, folds)?);
     section.figure(objects(context, folds)?);
     section.figure(confusions(context, folds)?);
-    section.table(Table {
-        id: "noise-kinds".into(),
-        title: "Accuracy after ten touches under other noise".into(),
-        caption:
-            "Other errors of a sensor, a timer or a robot, one at a time and then together. A robot's own error is the \
-                  same for all touches of a group."
-                .into(),
-        command: context.settings.command.clone(),
-        data: other_kinds(folds),
-    });
+    let title = "Accuracy after ten touches under other noise";
+    let caption = "Other errors of a sensor, a timer or a robot, one at a time and then together. A robot's own error is the same \
+                   for all touches of a group.";
+    section.figure(Figure::new("noise-kinds", title, caption, other_kinds(folds)));
     Ok(section)
 }
 
 /// Accuracy under other noise than Gaussian, one row for each kind.
-fn other_kinds(folds: &[Fold]) -> Records {
-    let mut table = Records::new(std::iter::once("what is added").chain(METHODS));
+fn other_kinds(folds: &[Fold]) -> Results {
+    let mut table = Results::new(std::iter::once("what is added").chain(METHODS));
     for (row, kind) in kinds().into_iter().enumerate() {
         let accuracy = |method: usize| {
             let (mean, deviation) =
                 mean_deviation(&folds.iter().map(|fold| fold.kinds[method][row]).collect::<Vec<_>>());
-            if folds.len() > 1 { Cell::PercentSpread(mean, deviation, 1) } else { Cell::Percent(mean, 1) }
+            if folds.len() > 1 { Value::PercentSpread(mean, deviation, 1) } else { Value::Percent(mean, 1) }
         };
-        table.push(std::iter::once(Cell::Text(kind.to_string())).chain((0..METHODS.len()).map(accuracy)));
+        table.push(row![kind.to_string()].into_iter().chain((0..METHODS.len()).map(accuracy)));
     }
     table
 }
@@ -196,12 +190,12 @@ fn other_kinds(folds: &[Fold]) -> Records {
 fn signal(context: &Context) -> Result<Figure> {
     let captured = context.captured()?;
     let deviations: Vec<f64> = context.settings.deviations().into_iter().filter(|&d| d > 0.0).collect();
-    let mut data = Records::new(["object", "noise (ms)", "signal-to-noise ratio (dB)"]);
+    let mut data = Results::new(["object", "noise (ms)", "signal-to-noise ratio (dB)"]);
     let mut lines = Vec::new();
     for object in &captured.data.objects {
         let points: Vec<(f64, f64)> = deviations.iter().map(|&d| (d, signal_to_noise(object, d))).collect();
         for &(deviation, ratio) in &points {
-            data.push([object.name.as_str().into(), Cell::Number(deviation, 2), Cell::Number(ratio, 2)]);
+            data.push(row![&object.name, Value::Number(deviation, 2), Value::Number(ratio, 2)]);
         }
         lines.push((object.name.as_str(), points));
     }
@@ -218,17 +212,11 @@ fn signal(context: &Context) -> Result<Figure> {
         let stroke = if index % 2 == 0 { Stroke::Solid } else { Stroke::Dashed };
         chart.line(name, color::series(index), stroke, points);
     }
-    Ok(Figure {
-        id: "signal-to-noise".into(),
-        title: "Signal-to-noise ratio of each object (figure 10)".into(),
-        caption: "The signal of a touch is the sum of its three contact times, its noise the sum of three independent ones of \
-                  this deviation, before the earliest time is subtracted; the ratio is of mean squares, over all captured \
-                  touches. The paper does not say if noise is taken before or after the subtraction."
-            .into(),
-        command: context.settings.command.clone(),
-        panels: vec![chart.svg()?],
-        data,
-    })
+    let caption = "The signal of a touch is the sum of its three contact times, its noise the sum of three independent ones of this \
+                   deviation, before the earliest time is subtracted; the ratio is of mean squares, over all captured touches. The \
+                   paper does not say if noise is taken before or after the subtraction.";
+    let title = "Signal-to-noise ratio of each object (figure 10)";
+    Ok(Figure::new("signal-to-noise", title, caption, data).drawn(vec![chart.svg()?]))
 }
 
 /// Mean over folds, for each level, of what `of` takes from a fold's accuracies of objects.
@@ -291,29 +279,24 @@ fn overall(context: &Context, folds: &[Fold]) -> Result<Figure> {
         Axis::percent((low * 10.0 - 0.5).floor() / 10.0, ((high * 10.0 + 0.5).ceil() / 10.0).min(1.0)),
     )
     .sized(660, 400);
-    let mut data = Records::new(["method", "noise (ms)", "accuracy", "smoothed"]);
+    let mut data = Results::new(["method", "noise (ms)", "accuracy", "smoothed"]);
     for ((method, name), raw) in METHODS.iter().enumerate().zip(raws) {
         let trials = context.settings.many_groups * folds.len() * context.objects.len();
         let smooth = smoothed(&raw, trials);
         for (point, smooth) in raw.iter().zip(&smooth) {
-            let row = [Cell::Number(point.0, 2), Cell::Percent(point.1, 1), Cell::Percent(smooth.1, 1)];
-            data.push(std::iter::once((*name).into()).chain(row));
+            let [raw, smooth] = [point.1, smooth.1].map(|share| Value::Percent(share, 1));
+            data.push(row![*name, Value::Number(point.0, 2), raw, smooth]);
         }
         chart.marks.push(Mark::Dots { points: raw, color: COLORS[method], shape: SHAPES[method] });
         chart.line(name, COLORS[method], Stroke::Solid, &smooth);
     }
-    Ok(Figure {
-        id: "noise".into(),
-        title: "Accuracy after ten touches against noise, over all objects (figure 12)".into(),
-        caption: smoothed_by(context.settings.deviations().len()),
-        command: context.settings.command.clone(),
-        panels: vec![chart.svg()?],
-        data,
-    })
+    let title = "Accuracy after ten touches against noise, over all objects (figure 12)";
+    let caption = smoothed_by(context.settings.deviations().len());
+    Ok(Figure::new("noise", title, caption, data).drawn(vec![chart.svg()?]))
 }
 
 fn objects(context: &Context, folds: &[Fold]) -> Result<Figure> {
-    let mut data = Records::new(["object", "method", "noise (ms)", "accuracy", "smoothed"]);
+    let mut data = Results::new(["object", "method", "noise (ms)", "accuracy", "smoothed"]);
     let mut panels = Vec::new();
     for (position, name) in context.names().iter().enumerate() {
         let mut chart = Chart::new("noise (ms)", Axis::linear(0.0, 10.0, 5), "", Axis::share())
@@ -323,13 +306,8 @@ fn objects(context: &Context, folds: &[Fold]) -> Result<Figure> {
             let raw = over_levels(context, folds, method, |objects| objects[position]);
             let smooth = smoothed(&raw, context.settings.many_groups * folds.len());
             for (point, smooth) in raw.iter().zip(&smooth) {
-                data.push([
-                    name.as_str().into(),
-                    METHODS[method].into(),
-                    Cell::Number(point.0, 2),
-                    Cell::Percent(point.1, 1),
-                    Cell::Percent(smooth.1, 1),
-                ]);
+                let [raw, smooth] = [point.1, smooth.1].map(|share| Value::Percent(share, 1));
+                data.push(row![name, METHODS[method], Value::Number(point.0, 2), raw, smooth]);
             }
             chart.line("", COLORS[method], Stroke::Thin, &raw);
             let stroke = if method == 0 { Stroke::Dashed } else { Stroke::Solid };
@@ -337,34 +315,18 @@ fn objects(context: &Context, folds: &[Fold]) -> Result<Figure> {
         }
         panels.push(chart.svg()?);
     }
-    Ok(Figure {
-        id: "noise-objects".into(),
-        title: "The same for each object (figure 11)".into(),
-        caption: "Thin lines are measured, thick ones smoothed.".into(),
-        command: context.settings.command.clone(),
-        panels,
-        data,
-    })
+    let caption = "Thin lines are measured, thick ones smoothed.";
+    Ok(Figure::new("noise-objects", "The same for each object (figure 11)", caption, data).drawn(panels))
 }
 
 fn confusions(context: &Context, folds: &[Fold]) -> Result<Figure> {
-    let names = context.names();
-    let mut data = Records::new(["method", "touched", "recognized as", "share"]);
-    let mut panels = Vec::new();
-    for (method, name) in METHODS.iter().enumerate() {
+    let methods = METHODS.into_iter().zip(COLORS).enumerate().map(|(method, (name, color))| {
         let matrices: Vec<&Vec<Vec<usize>>> = folds.iter().map(|fold| &fold.confusion[method]).collect();
-        let shares = normalized(&matrices);
-        panels.push(confusion::drawn(name, &names, &shares, COLORS[method])?);
-        push_matrix(&mut data, name, &names, &shares);
-    }
-    Ok(Figure {
-        id: "noise-confusion".into(),
-        title: format!("Confusion matrix after ten touches with noise of {} ms (figure 13)", NOISE / 1e3),
-        caption: "Percentage of an object's groups (row) that were recognized as another (column).".into(),
-        command: context.settings.command.clone(),
-        panels,
-        data,
-    })
+        (name, name, color, normalized(&matrices))
+    });
+    let title = format!("Confusion matrix after ten touches with noise of {} ms (figure 13)", NOISE / 1e3);
+    let caption = "Percentage of an object's groups (row) that were recognized as another (column).";
+    confusion::figure(["noise-confusion", &title, caption], &context.names(), methods)
 }
 
 #[cfg(test)]

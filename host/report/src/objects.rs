@@ -8,10 +8,11 @@ use crate::page::chart::{Chart, Mark, Stroke};
 use crate::page::color;
 use crate::page::document::{Block, Figure, Picture, Section};
 use crate::page::render;
-use crate::page::table::{Cell, Records, Table};
 use palpate::error::Result;
 use palpate::mesh::{Instance, Object};
 use palpate::probe::approach::Probe;
+use palpate::results::{Results, Value};
+use palpate::row;
 use palpate::touches::Origin;
 use palpate::wording::{decimal, percent};
 use palpate_shared::Touch;
@@ -45,27 +46,17 @@ pub(super) fn section(context: &Context) -> Result<Section> {
         }
     }
     section.figure(densities(context)?);
-    let mut data = Records::new(["object", "triangles", "full touches", "approaches", "share of full touches"]);
+    let mut data = Results::new(["object", "triangles", "full touches", "approaches", "share of full touches"]);
     for (object, &approaches) in context.objects.iter().zip(&captured.approaches) {
-        data.push([
-            object.name.as_str().into(),
-            Cell::count(object.mesh().triangles.len()),
-            Cell::count(touches),
-            Cell::count(approaches),
-            Cell::Percent(touches as f64 / approaches.max(1) as f64, 1),
-        ]);
+        let share = Value::Percent(touches as f64 / approaches.max(1) as f64, 1);
+        data.push(row![&object.name, object.mesh().triangles.len(), touches, approaches, share]);
     }
-    section.table(Table {
-        id: "objects-table".into(),
-        title: "What was captured".into(),
-        caption: format!(
-            "An approach is a full touch when all fingers touch. {} This capture took {} s.",
-            touched_by(&context.settings.capture),
-            decimal(captured.seconds, 1)
-        ),
-        command: context.settings.command.clone(),
-        data,
-    });
+    let caption = format!(
+        "An approach is a full touch when all fingers touch. {} This capture took {} s.",
+        touched_by(&context.settings.capture),
+        decimal(captured.seconds, 1)
+    );
+    section.figure(Figure::new("objects-table", "What was captured", caption, data));
     Ok(section)
 }
 
@@ -125,13 +116,13 @@ fn densities(context: &Context) -> Result<Figure> {
     // The middle nine tenths of every object fit.
     let ends = values.iter().flat_map(|values| [quantile(values, 0.05).abs(), quantile(values, 0.95).abs()]);
     let reach = ends.fold(1.0, f64::max).min(FARTHEST);
-    let mut data = Records::new(["object", "curvature (ms)", "density (1/ms)"]);
+    let mut data = Results::new(["object", "curvature (ms)", "density (1/ms)"]);
     let mut panels = Vec::new();
     for (object, values) in captured.data.objects.iter().zip(&values) {
         let curve = density(values, -reach, reach, 241);
         let top = curve.iter().map(|point| point.1).fold(0.0, f64::max).max(1e-12);
         for (value, density) in &curve {
-            data.push([object.name.as_str().into(), Cell::Number(*value, 2), Cell::Number(*density, 6)]);
+            data.push(row![&object.name, Value::Number(*value, 2), Value::Number(*density, 6)]);
         }
         let y = Axis::linear(0.0, top * 1.05, 3).without_grid().with_ticks(Vec::new());
         let mut chart = Chart::new("curvature κ (ms)", Axis::linear(-reach, reach, 4), "", y)
@@ -142,20 +133,14 @@ fn densities(context: &Context) -> Result<Figure> {
         chart.marks.push(Mark::Vertical(0.0));
         panels.push(chart.svg()?);
     }
-    Ok(Figure {
-        id: "curvature".into(),
-        title: "Curvature of each object under the probe: densities of the descriptor (figure 6)".into(),
-        caption: format!(
-            "κ = t₁ − 2·t₂ + t₃, the contact times of the three fingers; Gaussian kernel density with Silverman's \
-             bandwidth, each scaled to its own peak. The vertical line marks zero, a flat surface. Positive: convex (the \
-             middle finger touches early); negative: concave. The paper's caption has these two the other way around, and \
-             its formula, (t₁ − t₂) − (t₂ − t₃), has them as here.{}",
-            beyond(captured.data.names().iter().map(String::as_str).zip(&values), reach)
-        ),
-        command: context.settings.command.clone(),
-        panels,
-        data,
-    })
+    let caption = format!(
+        "κ = t₁ − 2·t₂ + t₃, the contact times of the three fingers; Gaussian kernel density with Silverman's bandwidth, each scaled \
+         to its own peak. The vertical line marks zero, a flat surface. Positive: convex (the middle finger touches early); negative: \
+         concave. The paper's caption has these two the other way around, and its formula, (t₁ − t₂) − (t₂ − t₃), has them as here.{}",
+        beyond(captured.data.names().iter().map(String::as_str).zip(&values), reach)
+    );
+    let title = "Curvature of each object under the probe: densities of the descriptor (figure 6)";
+    Ok(Figure::new("curvature", title, caption, data).drawn(panels))
 }
 
 /// The share of touches beyond the ends of the axes, of the object that has most of them there; nothing where that is

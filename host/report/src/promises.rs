@@ -8,14 +8,14 @@ use crate::page::axis::{Axis, short_number};
 use crate::page::chart::{Chart, Mark, Shape, Stroke};
 use crate::page::color;
 use crate::page::document::{Figure, Section};
-use crate::page::table::{Cell, Records, Table};
 use palpate::calibrate::{self, Limit, Odds, Per, Sequence, Terms, choose, follow, margin_of, odds_of};
 use palpate::compile;
 use palpate::error::{Kind, Result};
 use palpate::probe::scene::Scene;
+use palpate::results::{Results, Value};
 use palpate::touches::Origin;
-use palpate::with;
 use palpate::wording;
+use palpate::{row, with};
 use palpate_onboard::Model;
 use palpate_shared::Descriptor;
 
@@ -226,7 +226,7 @@ fn of_objects(sequences: &[Sequence], names: &[String], odds: [&Option<Odds>; 2]
 }
 
 /// The figure and the tables.
-pub(super) fn section(context: &Context, promises: &Promises) -> Result<Section> {
+pub(super) fn section(promises: &Promises) -> Result<Section> {
     let [found, tested] = promises.sequences;
     let mut section = Section::new("promises", "Promises");
     section.text(format!(
@@ -240,9 +240,7 @@ pub(super) fn section(context: &Context, promises: &Promises) -> Result<Section>
         wording::count(tested),
         uncalibrated(&promises.rates)
     ));
-    section.figure(figure(context, promises)?);
-    section.table(table(context, promises));
-    section.table(objects(context, promises));
+    section.figure(figure(promises)?).figure(table(promises)).figure(objects(promises));
     Ok(section)
 }
 
@@ -259,13 +257,13 @@ fn uncalibrated(rates: &[Promised]) -> String {
     )
 }
 
-fn figure(context: &Context, promises: &Promises) -> Result<Figure> {
+fn figure(promises: &Promises) -> Result<Figure> {
     let ticks = RATES.map(|rate| (rate, format!("{} %", short_number(rate * 100.0)))).to_vec();
     let (low, high) = (RATES[RATES.len() - 1] * 0.3, RATES[0] * 1.5);
     let axis = || Axis::logarithmic(low, high).with_ticks(ticks.clone());
     let mut chart = Chart::new("promised", axis(), "measured", axis()).sized(520, 420);
     chart.marks.push(Mark::Line { points: vec![(low, low), (high, high)], color: color::GRAY, stroke: Stroke::Dashed });
-    let mut data = Records::new(["thresholds", "promised", "measured", "low", "high"]);
+    let mut data = Results::new(["thresholds", "promised", "measured", "low", "high"]);
     type Of = fn(&Promised) -> Option<Stopped>;
     let ways = [
         ("uncalibrated", color::GRAY, Shape::Ring, (|of| Some(of.uncalibrated)) as Of),
@@ -276,8 +274,8 @@ fn figure(context: &Context, promises: &Promises) -> Result<Figure> {
         let measured: Vec<(f64, Stopped)> =
             promises.rates.iter().filter_map(|promised| Some((promised.rate, of(promised)?))).collect();
         for (rate, stopped) in &measured {
-            let shares = [*rate, stopped.error, stopped.low, stopped.high].map(|share| Cell::Percent(share, 3));
-            data.push(std::iter::once(name.into()).chain(shares));
+            let shares = [*rate, stopped.error, stopped.low, stopped.high].map(|share| Value::Percent(share, 3));
+            data.push(row![name].into_iter().chain(shares));
         }
         let visible = || measured.iter().filter(|(_, stopped)| stopped.error > low);
         let spread = visible().map(|(rate, stopped)| (*rate, stopped.low.max(low), stopped.high)).collect();
@@ -285,19 +283,13 @@ fn figure(context: &Context, promises: &Promises) -> Result<Figure> {
         let points: Vec<(f64, f64)> = visible().map(|(rate, stopped)| (*rate, stopped.error)).collect();
         chart.series(name, color, shape, &points);
     }
-    Ok(Figure {
-        id: "promises-kept".into(),
-        title: "Promised and measured error rates".into(),
-        caption: "On the dashed line the measured error rate equals the promised one; above it, the promise is broken. Bars are 95 % intervals (Wilson)."
-            .into(),
-        command: context.settings.command.clone(),
-        panels: vec![chart.svg()?],
-        data,
-    })
+    let caption = "On the dashed line the measured error rate equals the promised one; above it, the promise is broken. Bars are \
+                   95 % intervals (Wilson).";
+    Ok(Figure::new("promises-kept", "Promised and measured error rates", caption, data).drawn(vec![chart.svg()?]))
 }
 
-fn table(context: &Context, promises: &Promises) -> Table {
-    let mut data = Records::new([
+fn table(promises: &Promises) -> Figure {
+    let mut data = Results::new([
         "promised",
         "uncalibrated",
         "touches",
@@ -312,37 +304,32 @@ fn table(context: &Context, promises: &Promises) -> Table {
         "touches",
     ]);
     for promised in &promises.rates {
-        let error = |of: Option<Stopped>| of.map_or(Cell::Missing, |of| Cell::Percent(of.error, 2));
-        let touches = |of: Option<Stopped>| of.map_or(Cell::Missing, |of| Cell::Number(of.touches, 1));
-        let ratio = promised.average.zip(promised.limit).map(|(ours, limit)| ours.touches / limit.touches);
-        data.push([
-            Cell::Percent(promised.rate, 1),
-            error(Some(promised.uncalibrated)),
-            touches(Some(promised.uncalibrated)),
-            error(promised.average),
-            touches(promised.average),
-            promised.average.map_or(Cell::Missing, |of| Cell::Percent(of.undecided, 2)),
-            touches(promised.limit),
-            ratio.map_or(Cell::Missing, |ratio| Cell::Number(ratio, 2)),
-            error(promised.name),
-            touches(promised.name),
-            error(promised.object),
-            touches(promised.object),
+        let Promised { average, limit, name, object, .. } = *promised;
+        let uncalibrated = Some(promised.uncalibrated);
+        let error = |of: Option<Stopped>| of.map(|of| Value::Percent(of.error, 2));
+        let touches = |of: Option<Stopped>| of.map(|of| Value::Number(of.touches, 1));
+        data.push(row![
+            Value::Percent(promised.rate, 1),
+            error(uncalibrated),
+            touches(uncalibrated),
+            error(average),
+            touches(average),
+            average.map(|of| Value::Percent(of.undecided, 2)),
+            touches(limit),
+            average.zip(limit).map(|(ours, limit)| Value::Number(ours.touches / limit.touches, 2)),
+            error(name),
+            touches(name),
+            error(object),
+            touches(object),
         ]);
     }
-    Table {
-        id: "promises-table".into(),
-        title: "What promises cost".into(),
-        caption: "A dash (–) marks a rate that these sequences are too few to promise. A promise per object has one \
-                  threshold, strict enough for the object that is mistaken most often."
-            .into(),
-        command: context.settings.command.clone(),
-        data,
-    }
+    let caption = "A dash (–) marks a rate that these sequences are too few to promise. A promise per object has one threshold, strict \
+                   enough for the object that is mistaken most often.";
+    Figure::new("promises-table", "What promises cost", caption, data)
 }
 
-fn objects(context: &Context, promises: &Promises) -> Table {
-    let mut data = Records::new([
+fn objects(promises: &Promises) -> Figure {
+    let mut data = Results::new([
         "object",
         "touches, on average",
         "mistaken",
@@ -352,24 +339,17 @@ fn objects(context: &Context, promises: &Promises) -> Table {
         "named wrongly",
     ]);
     for object in &promises.objects {
-        let cells = object.promised.iter().flat_map(|meaning| match meaning {
-            Some(Meaning { touches, error, named_wrongly }) => {
-                [Cell::Number(*touches, 1), Cell::Percent(*error, 2), Cell::Percent(*named_wrongly, 2)]
-            }
-            None => [Cell::Missing, Cell::Missing, Cell::Missing],
+        let cells = object.promised.iter().flat_map(|meaning| {
+            let share = |of: fn(&Meaning) -> f64| meaning.as_ref().map(|meaning| Value::Percent(of(meaning), 2));
+            let touches = meaning.as_ref().map(|meaning| Value::Number(meaning.touches, 1));
+            row![touches, share(|of| of.error), share(|of| of.named_wrongly)]
         });
-        data.push(std::iter::once(object.name.as_str().into()).chain(cells));
+        data.push(row![&object.name].into_iter().chain(cells));
     }
-    Table {
-        id: "promises-objects".into(),
-        title: format!("A promise of {} for each object", wording::rate(SHOWN)),
-        caption:
-            "Mistaken: share of wrong names among those given to the object. Named wrongly: share of wrong ones when \
-                  its name is given. Dashes: too few sequences for the promise."
-                .into(),
-        command: context.settings.command.clone(),
-        data,
-    }
+    let title = format!("A promise of {} for each object", wording::rate(SHOWN));
+    let caption = "Mistaken: share of wrong names among those given to the object. Named wrongly: share of wrong ones when its name is \
+                   given. Dashes: too few sequences for the promise.";
+    Figure::new("promises-objects", title, caption, data)
 }
 
 #[cfg(test)]

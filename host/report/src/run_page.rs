@@ -4,8 +4,9 @@ use crate::page::axis::Axis;
 use crate::page::chart::{Chart, Mark, Shape, Stroke};
 use crate::page::color;
 use crate::page::document::{Block, Figure, Page, Picture, Section};
-use crate::page::table::{Cell, Records, Table};
 use palpate::error::Result;
+use palpate::results::{Results, Value};
+use palpate::row;
 use palpate::wording::count;
 
 /// Results of a run, as its page shows them.
@@ -20,7 +21,7 @@ pub struct RunResults {
     /// The methods compared, the paper's first.
     pub methods: Vec<RunMethod>,
     /// The table that the run prints: what was measured in the first column, then one column per method.
-    pub table: Records,
+    pub table: Results,
     /// Notes about the table, in sentences; may be empty.
     pub note: String,
     /// Settings, times and version, as name and value.
@@ -51,17 +52,12 @@ pub fn run_page(results: &RunResults) -> Result<Page> {
     section.blocks.push(Block::Pictures(results.pictures.clone()));
     sections.push(section);
     let mut section = Section::new("result", "The result");
-    section.table(Table {
-        id: "summary".into(),
-        title: "The paper's method and ours".into(),
-        caption: format!(
-            "The first two wait for full touches and were trained on the same; the last takes every approach with at least \
-             one contact as evidence. All are tested on the same approaches, which none was trained on. {}",
-            results.note
-        ),
-        command: results.command.clone(),
-        data: results.table.clone(),
-    });
+    let caption = format!(
+        "The first two wait for full touches and were trained on the same; the last takes every approach with at least one contact as \
+         evidence. All are tested on the same approaches, which none was trained on. {}",
+        results.note
+    );
+    section.figure(Figure::new("summary", "The paper's method and ours", caption, results.table.clone()));
     sections.push(section);
     let mut section = Section::new("accuracy", "Accuracy, touch by touch");
     section.figure(curves(results)?);
@@ -74,6 +70,7 @@ pub fn run_page(results: &RunResults) -> Result<Page> {
              {} added it up, touch by touch.",
             models("a compiled model", "compiled models", results.methods.iter().map(|method| method.bytes))
         ),
+        command: results.command.clone(),
         sections,
         facts: results.facts.clone(),
         files: false,
@@ -108,7 +105,7 @@ fn touches_scale(results: &RunResults) -> Axis {
 
 fn curves(results: &RunResults) -> Result<Figure> {
     let mut chart = Chart::new("touches", touches_scale(results), "accuracy", Axis::share()).sized(600, 380);
-    let mut data = Records::new(["method", "touches", "accuracy", "standard error"]);
+    let mut data = Results::new(["method", "touches", "accuracy", "standard error"]);
     for (index, method) in results.methods.iter().enumerate() {
         let (color, shape) = method_style(index);
         let bars = method.curve.iter().map(|&(n, a, e)| (n as f64, (a - 1.96 * e).max(0.0), (a + 1.96 * e).min(1.0)));
@@ -116,24 +113,13 @@ fn curves(results: &RunResults) -> Result<Figure> {
         let points: Vec<(f64, f64)> = method.curve.iter().map(|&(n, a, _)| (n as f64, a)).collect();
         chart.series(&method.name, color, shape, &points);
         for &(n, accuracy, error) in &method.curve {
-            data.push([
-                method.name.as_str().into(),
-                Cell::count(n),
-                Cell::Percent(accuracy, 1),
-                Cell::Percent(error, 2),
-            ]);
+            data.push(row![&method.name, n, Value::Percent(accuracy, 1), Value::Percent(error, 2)]);
         }
     }
-    Ok(Figure {
-        id: "accuracy-curves".into(),
-        title: "Share of groups recognized after a fixed number of touches".into(),
-        caption: "Each group holds touches of one object, drawn at random from touches that training never saw; all \
-                  objects are weighted equally. Bars are 95 % confidence intervals."
-            .into(),
-        command: results.command.clone(),
-        panels: vec![chart.svg()?],
-        data,
-    })
+    let caption = "Each group holds touches of one object, drawn at random from touches that training never saw; all objects are weighted \
+                   equally. Bars are 95 % confidence intervals.";
+    let title = "Share of groups recognized after a fixed number of touches";
+    Ok(Figure::new("accuracy-curves", title, caption, data).drawn(vec![chart.svg()?]))
 }
 
 fn objects(results: &RunResults) -> Result<Figure> {
@@ -143,7 +129,7 @@ fn objects(results: &RunResults) -> Result<Figure> {
             names.push(name);
         }
     }
-    let mut data = Records::new(["object", "method", "touches", "accuracy"]);
+    let mut data = Results::new(["object", "method", "touches", "accuracy"]);
     let mut panels = Vec::new();
     for name in names {
         let mut chart = Chart::new("touches", touches_scale(results), "", Axis::share()).sized(270, 200).titled(name);
@@ -154,19 +140,13 @@ fn objects(results: &RunResults) -> Result<Figure> {
             let stroke = if index == 0 { Stroke::Dashed } else { Stroke::Solid };
             chart.line(&method.name, color, stroke, &points);
             for &(n, accuracy) in curve.into_iter().flatten() {
-                data.push([name.into(), method.name.as_str().into(), Cell::count(n), Cell::Percent(accuracy, 1)]);
+                data.push(row![name, &method.name, n, Value::Percent(accuracy, 1)]);
             }
         }
         panels.push(chart.svg()?);
     }
-    Ok(Figure {
-        id: "accuracy-objects".into(),
-        title: "The same for each object".into(),
-        caption: "Percentages are of groups of touches of that object alone.".into(),
-        command: results.command.clone(),
-        panels,
-        data,
-    })
+    let caption = "Percentages are of groups of touches of that object alone.";
+    Ok(Figure::new("accuracy-objects", "The same for each object", caption, data).drawn(panels))
 }
 
 #[cfg(test)]
@@ -183,8 +163,8 @@ mod tests {
                 ("bowl".into(), vec![(5, 0.5), (30, 1.0)]),
             ],
         };
-        let mut table = Records::new(["", "paper", "ours"]);
-        table.push(["accuracy at 10".into(), Cell::Percent(0.65, 1), Cell::Percent(0.75, 1)]);
+        let mut table = Results::new(["", "paper", "ours"]);
+        table.push(row!["accuracy at 10", Value::Percent(0.65, 1), Value::Percent(0.75, 1)]);
         RunResults {
             command: "palpate run builtin --seed 1".into(),
             play: "play.html".into(),
@@ -200,7 +180,7 @@ mod tests {
     fn the_short_page_shows_objects_table_and_curves_of_both_methods_and_writes_csv_and_svg_beside_it() {
         let mut page = run_page(&results()).unwrap();
         let html = page.html();
-        assert_eq!(page.figures().count(), 2);
+        assert_eq!(page.figures().count(), 3);
         // One of them is drawn for a phone as well.
         assert_eq!(html.matches("<svg ").count(), 4);
         for part in [

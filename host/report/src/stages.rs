@@ -4,16 +4,18 @@ use super::context::{Context, get_or_try};
 use super::measured::Measured;
 use super::settings::{Part, Settings};
 use super::{cost, cross_validation, limit, noise, objects, promises, published, results};
-use crate::page::document::{Page, Section};
-use crate::page::table::{Cell, Records, Table};
+use crate::page::document::{Figure, Page, Section};
 use palpate::error::{Result, problem};
 use palpate::mesh::Object;
 use palpate::output::write_json;
 use palpate::progress::{self, Progress};
+use palpate::results::Results;
+use palpate::row;
 use palpate::wording::count;
 use serde::Serialize;
 use serde_json::json;
 use std::cell::OnceCell;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
@@ -115,12 +117,12 @@ pub fn report(
     let stages = stages.seconds;
     progress.enter("drawing");
 
-    let summary = published::summary(&context, &measured);
-    let sections = sections(&context, &measured, &summary)?;
-    let sentence = published::sentence(&summary);
+    let sections = sections(&context, &measured)?;
+    let sentence = published::sentence(&context, &measured);
     let page = Page {
         title: "Recognizing objects by touch".into(),
         summary: sentence.clone(),
+        command: settings.command.clone(),
         sections,
         facts: facts(settings, &stages, began.elapsed().as_secs_f64()),
         files: true,
@@ -130,7 +132,7 @@ pub fn report(
         made_from: &made_from,
         settings,
         version: env!("CARGO_PKG_VERSION"),
-        summary: &summary,
+        tables: page.tables(),
         stages: &stages,
     };
     let path = directory.join("summary.json");
@@ -155,7 +157,7 @@ fn measured(context: &Context, stages: &mut Stages<'_>) -> Result<Measured> {
 }
 
 /// The page's sections, in order.
-fn sections(context: &Context, measured: &Measured, summary: &published::Summary) -> Result<Vec<Section>> {
+fn sections(context: &Context, measured: &Measured) -> Result<Vec<Section>> {
     let mut first = Section::new("summary", "The paper's numbers compared with ours");
     let damaged = objects::to_repair(context);
     if !damaged.is_empty() {
@@ -163,10 +165,11 @@ fn sections(context: &Context, measured: &Measured, summary: &published::Summary
         let why = if chosen { " The section on the objects says why." } else { "" };
         first.warning(format!("the figures are of meshes that should be repaired first: {}.{why}", damaged.join(", ")));
     }
-    for table in [published::table(context, summary, measured)?, published::large(context, summary, measured)] {
-        table.map(|table| first.table(table));
+    let tables =
+        [published::table(context, measured)?, published::large(context, measured), shortened(context.settings)];
+    for table in tables.into_iter().flatten() {
+        first.figure(table);
     }
-    shortened(context.settings).map(|table| first.table(table));
     let mut sections = vec![first];
     sections.retain(|section| !section.blocks.is_empty());
     if context.settings.parts.contains(&Part::Objects) {
@@ -179,27 +182,22 @@ fn sections(context: &Context, measured: &Measured, summary: &published::Summary
         shown(&measured.folds, |of| cross_validation::section(context, of))?,
         shown(&measured.noisy, |of| noise::section(context, of))?,
         shown(&measured.limit, |of| limit::section(context, of))?,
-        shown(&measured.promises, |of| promises::section(context, of))?,
-        shown(&measured.members, |of| cost::section(context, of))?,
+        shown(&measured.promises, promises::section)?,
+        shown(&measured.members, |of| cost::section(of))?,
     ];
     sections.extend(all.into_iter().flatten());
     Ok(sections)
 }
 
 /// Numbers that a quick report shortens; none of a full one.
-fn shortened(settings: &Settings) -> Option<Table> {
+fn shortened(settings: &Settings) -> Option<Figure> {
     let numbers = settings.shortened();
-    let mut data = Records::new(["number", "here", "in a full report"]);
+    let mut data = Results::new(["number", "here", "in a full report"]);
     for &(name, here, full) in &numbers {
-        data.push([name.into(), Cell::count(here), Cell::count(full)]);
+        data.push(row![name, here, full]);
     }
-    (!numbers.is_empty()).then(|| Table {
-        id: "shortened".into(),
-        title: "What --quick shortens".into(),
-        caption: "All other numbers are those of a full report.".into(),
-        command: settings.command.clone(),
-        data,
-    })
+    let caption = "All other numbers are those of a full report.";
+    (!numbers.is_empty()).then(|| Figure::new("shortened", "What --quick shortens", caption, data))
 }
 
 /// Contents of `summary.json`.
@@ -209,7 +207,8 @@ struct Everything<'a> {
     made_from: &'a serde_json::Value,
     settings: &'a Settings,
     version: &'a str,
-    summary: &'a published::Summary,
+    /// The page's tables.
+    tables: BTreeMap<&'a str, &'a Results>,
     stages: &'a [(String, f64)],
 }
 
@@ -393,9 +392,13 @@ mod tests {
             assert!(!html.contains(&format!("<figure id=\"{other}\">")), "{other}");
         }
         assert!(!html.contains("After ten touches") && !html.contains("touches until sure"), "{}", noise.sentence);
-        let paper = &noise.summary["summary"]["paper"];
-        assert!(paper["at_10_with_5_ms"].is_array() && paper.get("at_10").is_none(), "{paper}");
-        assert!(noise.summary["summary"].get("limit_at_10").is_none());
+        let tables = &noise.summary["tables"];
+        let accuracy = &tables["published"][0];
+        assert!(
+            accuracy["measure"] == "accuracy after 10, noise of 5 ms" && accuracy["ours here"].is_array(),
+            "{accuracy}"
+        );
+        assert!(tables.get("limit").is_none());
 
         // Its sections would be lost, so it is asked for.
         let both = with(&[Part::Objects, Part::Limit]);
@@ -405,7 +408,7 @@ mod tests {
         assert_eq!(names(&both), ["limit"]);
         let html = read();
         assert!(html.contains("<figure id=\"limit-curves\">") && html.contains("<figure id=\"curvature\">"));
-        assert!(both.summary["summary"]["limit_at_10"].is_number());
+        assert!(both.summary["tables"]["published-large"][0]["limit"].is_number());
     }
 
     #[test]

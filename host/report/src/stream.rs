@@ -4,9 +4,10 @@ use crate::page::axis::{Axis, number};
 use crate::page::chart::{Chart, Mark, Shape};
 use crate::page::color;
 use crate::page::document::{Figure, Page, Section};
-use crate::page::table::{Cell, Records, Table};
 use palpate::error::Result;
 use palpate::evaluate::Finding;
+use palpate::results::{Results, Value};
+use palpate::row;
 use palpate::stream::{Evaluated, Grown, Point};
 use palpate::wording::{compared, count, percent, rate};
 
@@ -19,13 +20,13 @@ const MOST_CLASSES: usize = 8;
 /// If a chart cannot be drawn.
 pub fn page(evaluated: &Evaluated, command: &str) -> Result<Page> {
     let mut rows = Section::new("rows", "Rows to a verdict");
-    rows.text(promise(evaluated)).figure(curves(evaluated, command)?).text(fewer(evaluated));
+    rows.text(promise(evaluated)).figure(curves(evaluated)?).text(fewer(evaluated));
     let mut confusion = Section::new("confusion", "Confusion");
-    confusion.table(matrix(evaluated, command));
+    confusion.figure(matrix(evaluated));
     let mut sections = vec![rows, confusion];
     if let Some(grown) = &evaluated.grown {
         let mut one = Section::new("one", "One sequence");
-        one.figure(posteriors(evaluated, grown, command)?);
+        one.figure(posteriors(evaluated, grown)?);
         sections.push(one);
     }
     let groups = evaluated.groups.map_or_else(String::new, |groups| format!(" of {groups} groups"));
@@ -37,6 +38,7 @@ pub fn page(evaluated: &Evaluated, command: &str) -> Result<Page> {
             percent(evaluated.error, 2),
             number(evaluated.mean_rows, 1),
         ),
+        command: command.into(),
         sections,
         facts: vec![("Command".into(), command.into()), ("palpate".into(), env!("CARGO_PKG_VERSION").into())],
         files: false,
@@ -88,11 +90,11 @@ fn shown(evaluated: &Evaluated, error: f64) -> f64 {
     error.max(0.5 / evaluated.sequences.max(1) as f64)
 }
 
-fn curves(evaluated: &Evaluated, command: &str) -> Result<Figure> {
+fn curves(evaluated: &Evaluated) -> Result<Figure> {
     let comparison = &evaluated.comparison;
     let early: Vec<Point> = comparison.early.iter().copied().filter(|point| point.named > 0.0).collect();
     let all = [("early stopping", &early), ("fixed number", &comparison.fixed), ("majority vote", &comparison.vote)];
-    let mut data = Records::new(["method", "rows", "error", "named"]);
+    let mut data = Results::new(["method", "rows", "error", "named"]);
     let points = || all.iter().flat_map(|(_, points)| points.iter());
     let most = points().map(|point| point.rows).fold(1.0, f64::max);
     let worst = points().map(|point| point.error).fold(0.1, f64::max).min(1.0);
@@ -108,52 +110,35 @@ fn curves(evaluated: &Evaluated, command: &str) -> Result<Figure> {
         let line: Vec<(f64, f64)> = points.iter().map(|point| (point.rows, shown(evaluated, point.error))).collect();
         chart.series(name, color::series(index), Shape::Disc, &line);
         for point in points.iter() {
-            data.push([
-                (*name).into(),
-                Cell::Number(point.rows, 2),
-                Cell::Percent(point.error, 2),
-                Cell::Percent(point.named, 1),
-            ]);
+            let (error, named) = (Value::Percent(point.error, 2), Value::Percent(point.named, 1));
+            data.push(row![*name, Value::Number(point.rows, 2), error, named]);
         }
     }
     // Last, over the lines, and named where it is.
     let own = (evaluated.mean_rows, shown(evaluated, evaluated.error));
     chart.marks.push(Mark::Dots { points: vec![own], color: color::INK, shape: Shape::Square });
     chart.marks.push(Mark::Note { at: own, text: "this model".into(), color: color::INK });
-    Ok(Figure {
-        id: "rows-to-a-verdict".into(),
-        title: "Wrong names against rows".into(),
-        caption: "Early stopping at thresholds from strict to loose, the same for all names; the class with the most evidence after \
-                  a fixed number of rows, and the class that most of as many rows are recognized as, each row taken alone. A \
-                  sequence with fewer rows uses all that it has. Zero errors are drawn as half an error (the axis is logarithmic). \
-             The square is this model, with its own thresholds."
-            .into(),
-        command: command.into(),
-        panels: vec![chart.svg()?],
-        data,
-    })
+    let caption = "Early stopping at thresholds from strict to loose, the same for all names; the class with the most evidence after a \
+                   fixed number of rows, and the class that most of as many rows are recognized as, each row taken alone. A sequence \
+                   with fewer rows uses all that it has. Zero errors are drawn as half an error (the axis is logarithmic). The square \
+                   is this model, with its own thresholds.";
+    Ok(Figure::new("rows-to-a-verdict", "Wrong names against rows", caption, data).drawn(vec![chart.svg()?]))
 }
 
-fn matrix(evaluated: &Evaluated, command: &str) -> Table {
+fn matrix(evaluated: &Evaluated) -> Figure {
     let head = std::iter::once("class".to_owned()).chain(evaluated.names.iter().cloned()).chain(["no name".to_owned()]);
-    let mut data = Records::new(head);
+    let mut data = Results::new(head);
     for (name, counts) in evaluated.names.iter().zip(&evaluated.confusion) {
-        let row = std::iter::once(name.as_str().into()).chain(counts.iter().map(|&count| Cell::count(count)));
-        data.push(row);
+        data.push(row![name].into_iter().chain(counts.iter().map(|&count| count.into())));
     }
-    Table {
-        id: "confusion".into(),
-        title: "Sequences of each class, by the name that they were given".into(),
-        caption: "Row by row the class, column by column the name.".into(),
-        command: command.into(),
-        data,
-    }
+    let title = "Sequences of each class, by the name that they were given";
+    Figure::new("confusion", title, "Row by row the class, column by column the name.", data)
 }
 
-fn posteriors(evaluated: &Evaluated, grown: &Grown, command: &str) -> Result<Figure> {
+fn posteriors(evaluated: &Evaluated, grown: &Grown) -> Result<Figure> {
     let rows = grown.posteriors.len().max(2);
     let mut chart = Chart::new("rows", Axis::linear(1.0, rows as f64, 8), "posterior", Axis::share()).sized(760, 380);
-    let mut data = Records::new(["rows", "class", "posterior"]);
+    let mut data = Results::new(["rows", "class", "posterior"]);
     // The classes that matter most, in the model's order.
     let mut order: Vec<usize> = (0..evaluated.names.len()).collect();
     let most = |class: usize| grown.posteriors.iter().map(|row| row[class]).fold(0.0, f64::max);
@@ -165,7 +150,7 @@ fn posteriors(evaluated: &Evaluated, grown: &Grown, command: &str) -> Result<Fig
             (1_u32..).map(f64::from).zip(grown.posteriors.iter().map(|row| row[class])).collect();
         chart.series(name, color::series(index), Shape::Disc, &line);
         for (row, posterior) in &line {
-            data.push([Cell::Number(*row, 0), name.as_str().into(), Cell::Percent(*posterior, 2)]);
+            data.push(row![Value::Number(*row, 0), name, Value::Percent(*posterior, 2)]);
         }
     }
     let name = |class: usize| evaluated.names.get(class).map_or("", String::as_str);
@@ -177,14 +162,9 @@ fn posteriors(evaluated: &Evaluated, grown: &Grown, command: &str) -> Result<Fig
     let longer = grown
         .longer
         .map_or_else(String::new, |share| format!(" Of the sequences with a name, {} take longer.", percent(share, 0)));
-    Ok(Figure {
-        id: "one-sequence".into(),
-        title: format!("The evidence of one sequence of {} as it grows", name(grown.class)),
-        caption: format!("{ended} Later rows are shown as if there had been no verdict.{longer}"),
-        command: command.into(),
-        panels: vec![chart.svg()?],
-        data,
-    })
+    let title = format!("The evidence of one sequence of {} as it grows", name(grown.class));
+    let caption = format!("{ended} Later rows are shown as if there had been no verdict.{longer}");
+    Ok(Figure::new("one-sequence", title, caption, data).drawn(vec![chart.svg()?]))
 }
 
 #[cfg(test)]

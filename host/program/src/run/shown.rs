@@ -2,14 +2,16 @@
 
 use super::{AT_APPROACHES, METHODS, Method, PICTURE, PLAY, Recognition, Summary, TABLE_AT, Trial};
 use palpate::capture;
-use palpate::evaluate::{Approaches, Finding, PromiseCheck};
+use palpate::evaluate::{Approaches, Evaluation, Finding, PromiseCheck, Sequential};
 use palpate::mesh::Object;
+use palpate::results::{Results, Value};
+use palpate::row;
 use palpate::wording::{count, decimal, percent, rate};
 use palpate_report::page::document::Picture;
 use palpate_report::page::render;
-use palpate_report::page::table::{Cell, Records};
 use palpate_report::run_page::RunMethod;
 use palpate_report::statistics::{LEAST_GROUPS, distinct_groups};
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -51,77 +53,57 @@ pub(super) fn shown(name: &str, Trial { curve, method, fewest, .. }: &Trial) -> 
 
 /// The table that the program prints and the page shows: the paper's method, ours where it waits for full touches, and
 /// ours where every contact is evidence, side by side.
-pub(super) fn table(summary: &Summary) -> Records {
-    let mut table = Records::new(["measure"].into_iter().chain(METHODS));
-    let both = |cell: &dyn Fn(&Method) -> Cell| [&summary.paper, &summary.full, &summary.ours].map(cell);
-    let mut row = |name: String, [paper, full, ours]: [Cell; 3]| table.push([Cell::Text(name), paper, full, ours]);
+pub(super) fn table(summary: &Summary) -> Results {
+    let mut table = Results::new(["measure"].into_iter().chain(METHODS));
+    let mut row = |name: &str, [paper, full, ours]: [Value; 3]| table.push(row![name, paper, full, ours]);
+    let both = |value: &dyn Fn(&Method) -> Value| [&summary.paper, &summary.full, &summary.ours].map(value);
+    let approaches =
+        |value: &dyn Fn(&Approaches) -> Value| both(&|method| method.evaluation.approaches.as_ref().map(value).into());
     let wanted = rate(summary.ours.evaluation.sequential.error_rate);
-    let approaches = |cell: &dyn Fn(&Approaches) -> Cell| {
-        both(&|method| method.evaluation.approaches.as_ref().map_or(Cell::Missing, cell))
+    let promised = |of: &Sequential| of.promised.map(|rate| Value::Percent(rate, 2)).into();
+    let accuracy = |accuracy: &BTreeMap<usize, f64>, errors: &BTreeMap<usize, f64>, at: usize| {
+        accuracy.get(&at).zip(errors.get(&at)).map(|(&share, &error)| Value::PercentSpread(share, error, 1)).into()
     };
     row(
-        format!("approaches to a {wanted} error rate, stopping when sure"),
-        approaches(&|of| Cell::Spread(of.sequential.mean().value, of.sequential.mean().standard_error, 1)),
+        &format!("approaches to a {wanted} error rate, stopping when sure"),
+        approaches(&|of| Value::Spread(of.sequential.mean().value, of.sequential.mean().standard_error, 1)),
     );
-    let promised = |rate: Option<f64>| rate.map_or(Cell::Missing, |rate| Cell::Percent(rate, 2));
-    row("  promised".into(), approaches(&|of| promised(of.sequential.promised)));
-    row("  wrong verdicts".into(), approaches(&|of| Cell::Percent(of.sequential.error, 2)));
-    row("  undecided when touches ran out".into(), approaches(&|of| Cell::Percent(of.sequential.undecided, 2)));
+    row("  promised", approaches(&|of| promised(&of.sequential)));
+    row("  wrong verdicts", approaches(&|of| Value::Percent(of.sequential.error, 2)));
+    row("  undecided when touches ran out", approaches(&|of| Value::Percent(of.sequential.undecided, 2)));
     for at in AT_APPROACHES {
-        let cell = |of: &Approaches| match (of.accuracy.get(&at), of.accuracy_standard_error.get(&at)) {
-            (Some(&accuracy), Some(&error)) => Cell::PercentSpread(accuracy, error, 1),
-            _ => Cell::Missing,
-        };
-        row(format!("accuracy after {at} approaches"), approaches(&cell));
+        let name = format!("accuracy after {at} approaches");
+        row(&name, approaches(&|of| accuracy(&of.accuracy, &of.accuracy_standard_error, at)));
     }
-    row("share of approaches that are evidence".into(), approaches(&|of| Cell::Percent(of.used, 1)));
+    row("share of approaches that are evidence", approaches(&|of| Value::Percent(of.used, 1)));
     for at in TABLE_AT {
-        let cell = |method: &Method| {
-            let evaluation = &method.evaluation;
-            match (evaluation.accuracy.get(&at), evaluation.accuracy_standard_error.get(&at)) {
-                (Some(&accuracy), Some(&error)) => Cell::PercentSpread(accuracy, error, 1),
-                _ => Cell::Missing,
-            }
-        };
-        row(format!("accuracy after {at} touches"), both(&cell));
+        let of = |of: &Evaluation| accuracy(&of.accuracy, &of.accuracy_standard_error, at);
+        row(&format!("accuracy after {at} touches"), both(&|method| of(&method.evaluation)));
     }
+    let touches = |value: &dyn Fn(&Sequential) -> Value| both(&|method| value(&method.evaluation.sequential));
     row(
-        format!("touches to a {wanted} error rate, stopping when sure"),
-        both(&|m| {
-            let sequential = &m.evaluation.sequential;
-            Cell::Spread(sequential.mean_touches, sequential.mean().standard_error, 1)
-        }),
+        &format!("touches to a {wanted} error rate, stopping when sure"),
+        touches(&|of| Value::Spread(of.mean_touches, of.mean().standard_error, 1)),
     );
-    row("  promised".into(), both(&|m| promised(m.evaluation.sequential.promised)));
-    row("  wrong verdicts".into(), both(&|m| Cell::Percent(m.evaluation.sequential.error, 2)));
-    row("  undecided when touches ran out".into(), both(&|m| Cell::Percent(m.evaluation.sequential.undecided, 2)));
-    row(
-        format!("touches to a {wanted} error rate, a fixed number"),
-        both(&|m| {
-            m.fixed_touches.map_or_else(
-                || {
-                    if m.followed_to == 0 {
-                        Cell::Missing
-                    } else {
-                        Cell::Text(format!("over {}", count(m.followed_to)))
-                    }
-                },
-                Cell::count,
-            )
-        }),
-    );
-    row("model bytes".into(), both(&|m| Cell::count(m.model_bytes)));
-    row("trees".into(), both(&|m| Cell::count(m.trees)));
-    row("training, seconds".into(), both(&|m| Cell::Number(m.train_seconds, 1)));
+    row("  promised", touches(&promised));
+    row("  wrong verdicts", touches(&|of| Value::Percent(of.error, 2)));
+    row("  undecided when touches ran out", touches(&|of| Value::Percent(of.undecided, 2)));
+    let fixed = |method: &Method| match (method.fixed_touches, method.followed_to) {
+        (None, 0) => Value::Missing,
+        (None, followed) => format!("over {}", count(followed)).into(),
+        (touches, _) => touches.into(),
+    };
+    row(&format!("touches to a {wanted} error rate, a fixed number"), both(&fixed));
+    row("model bytes", both(&|method| method.model_bytes.into()));
+    row("trees", both(&|method| method.trees.into()));
+    row("training, seconds", both(&|method| Value::Number(method.train_seconds, 1)));
     let captures = [&summary.capture, &summary.capture, &summary.approach_capture];
-    row("capture, seconds".into(), captures.map(|capture| Cell::Number(capture.seconds, 1)));
-    row(
-        "approaches captured per second".into(),
-        captures.map(|capture| Cell::Number(capture.approaches() as f64 / capture.seconds.max(1e-9), 0)),
-    );
-    row("largest margin error, nats".into(), both(&|m| Cell::Number(m.parity.max_margin_error, 5)));
-    row("  bound that the model states".into(), both(&|m| Cell::Number(m.parity.stated_bound, 5)));
-    row("verdicts that differ from the full model's".into(), both(&|m| Cell::count(m.parity.verdict_differs)));
+    row("capture, seconds", captures.map(|capture| Value::Number(capture.seconds, 1)));
+    let speed = |of: &capture::Summary| Value::Number(of.approaches() as f64 / of.seconds.max(1e-9), 0);
+    row("approaches captured per second", captures.map(speed));
+    row("largest margin error, nats", both(&|method| Value::Number(method.parity.max_margin_error, 5)));
+    row("  bound that the model states", both(&|method| Value::Number(method.parity.stated_bound, 5)));
+    row("verdicts that differ from the full model's", both(&|method| method.parity.verdict_differs.into()));
     table
 }
 
@@ -229,46 +211,17 @@ pub fn text(summary: &Summary, out: &Path) -> String {
         count(summary.touches.test),
         count(summary.approaches.test),
     );
-    let width = summary.recognized.iter().map(|r| r.touched.chars().count()).max().unwrap_or(0);
-    for recognition in &summary.recognized {
-        let Recognition { touched, recognized, touches: _, approaches, posterior } = recognition;
-        _ = match recognized {
-            Some(name) if name == touched => {
-                writeln!(
-                    text,
-                    "  {touched:width$}  recognized after {approaches:>3} approaches, posterior {posterior:.4}"
-                )
-            }
-            Some(name) => {
-                writeln!(
-                    text,
-                    "  {touched:width$}  mistaken for {name} after {approaches} approaches, posterior {posterior:.4}"
-                )
-            }
-            None => writeln!(text, "  {touched:width$}  undecided after {approaches} approaches"),
+    let mut recognized = Results::list();
+    for Recognition { touched, recognized: name, touches: _, approaches, posterior } in &summary.recognized {
+        let said = match name {
+            Some(name) if name == touched => "recognized".to_owned(),
+            Some(name) => format!("mistaken for {name}"),
+            None => "undecided".to_owned(),
         };
+        let posterior = name.as_ref().map_or_else(String::new, |_| format!(", posterior {posterior:.4}"));
+        recognized.push([format!("  {touched}"), format!("{said} after {approaches} approaches{posterior}")]);
     }
-    let table = table(summary);
-    let rows: Vec<Vec<String>> = std::iter::once(table.columns.clone())
-        .chain(table.rows.iter().map(|row| row.iter().map(Cell::shown).collect()))
-        .collect();
-    let widths: Vec<usize> =
-        (0..4).map(|column| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0)).collect();
-    _ = writeln!(text);
-    for row in &rows {
-        _ = writeln!(
-            text,
-            "{:w0$}  {:>w1$}  {:>w2$}  {:>w3$}",
-            row[0],
-            row[1],
-            row[2],
-            row[3],
-            w0 = widths[0],
-            w1 = widths[1],
-            w2 = widths[2],
-            w3 = widths[3]
-        );
-    }
+    text += &format!("{}\n{}", recognized.text(), table(summary).text());
     let note = note(summary);
     if !note.is_empty() {
         _ = writeln!(text, "\n{note}");

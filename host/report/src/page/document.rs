@@ -1,35 +1,43 @@
 //! A page of sections: one HTML file with its style, script, drawings and pictures inside.
 
-use super::table::{Cell, Records, Table};
 use super::{chart::Svg, html};
+use crate::bug;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, PreEscaped, html};
 use palpate::error::Result;
 use palpate::output;
+use palpate::results::{Results, Value};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// The page's style.
 pub(crate) const STYLE: &str = include_str!("page.css");
 
-/// A figure: one or more drawings side by side, with the numbers behind them.
+/// Results in the page: one or more drawings of them side by side, or a table with columns that sort.
 #[derive(Clone, Debug)]
 pub struct Figure {
     /// Its anchor, and its files' stem.
-    pub id: String,
-    /// Title of the figure.
-    pub title: String,
-    /// Caption: how to read it, and how it was made.
-    pub caption: String,
-    /// The command that remakes it.
-    pub command: String,
-    /// Its drawings, at least one.
-    pub panels: Vec<Svg>,
-    /// The numbers drawn.
-    pub data: Records,
+    id: String,
+    title: String,
+    /// How to read it, and how it was made.
+    caption: String,
+    /// The drawings; none of a table.
+    panels: Vec<Svg>,
+    data: Results,
 }
 
 impl Figure {
+    /// A table of `data`.
+    pub fn new(id: &str, title: impl Into<String>, caption: impl Into<String>, data: Results) -> Self {
+        Self { id: id.into(), title: title.into(), caption: caption.into(), panels: Vec::new(), data }
+    }
+
+    /// The figure with drawings instead of a table.
+    pub(crate) fn drawn(self, panels: Vec<Svg>) -> Self {
+        Self { panels, ..self }
+    }
+
     /// All panels in one drawing on white, in rows of at most 1,160 pixels.
     pub(crate) fn whole_svg(&self) -> Svg {
         let cell = |size: fn(&Svg) -> u32| self.panels.iter().map(size).max().unwrap_or(1);
@@ -56,10 +64,8 @@ pub enum Block {
     Text(String),
     /// A paragraph about what may make the figures wrong.
     Warning(String),
-    /// A figure.
+    /// A figure or a table.
     Figure(Figure),
-    /// A table.
-    Table(Table),
     /// A paragraph that is a link to a file beside the page: the file's name, and what the link says.
     Link(String, String),
     /// Small pictures, each with a name and a line below it.
@@ -106,15 +112,9 @@ impl Section {
         self
     }
 
-    /// Adds a figure.
+    /// Adds a figure or a table.
     pub fn figure(&mut self, figure: Figure) -> &mut Self {
         self.blocks.push(Block::Figure(figure));
-        self
-    }
-
-    /// Adds a table.
-    pub fn table(&mut self, table: Table) -> &mut Self {
-        self.blocks.push(Block::Table(table));
         self
     }
 }
@@ -126,6 +126,8 @@ pub struct Page {
     pub title: String,
     /// One or two sentences below the title.
     pub summary: String,
+    /// The command that remakes its figures; may be empty.
+    pub command: String,
     /// The sections, in order.
     pub sections: Vec<Section>,
     /// The footer: settings and version, as name and value.
@@ -135,18 +137,16 @@ pub struct Page {
 }
 
 impl Page {
-    /// All figures, in order.
-    pub fn figures(&self) -> impl Iterator<Item = &Figure> {
-        self.blocks().filter_map(|block| if let Block::Figure(figure) = block { Some(figure) } else { None })
+    /// All figures and tables, in order.
+    pub(crate) fn figures(&self) -> impl Iterator<Item = &Figure> {
+        let blocks = self.sections.iter().flat_map(|section| &section.blocks);
+        blocks.filter_map(|block| if let Block::Figure(figure) = block { Some(figure) } else { None })
     }
 
-    /// All tables, in order.
-    pub fn tables(&self) -> impl Iterator<Item = &Table> {
-        self.blocks().filter_map(|block| if let Block::Table(table) = block { Some(table) } else { None })
-    }
-
-    fn blocks(&self) -> impl Iterator<Item = &Block> {
-        self.sections.iter().flat_map(|section| &section.blocks)
+    /// The results of all tables, by their names.
+    pub(crate) fn tables(&self) -> BTreeMap<&str, &Results> {
+        let tables = self.figures().filter(|figure| figure.panels.is_empty());
+        tables.map(|table| (table.id.as_str(), &table.data)).collect()
     }
 
     /// The page as HTML.
@@ -186,14 +186,11 @@ impl Page {
     /// [`Kind::Io`](palpate::error::Kind::Io) naming the file.
     pub fn write(&self, path: &Path) -> Result<Vec<PathBuf>> {
         let mut files = Vec::new();
-        if self.files {
-            for figure in self.figures() {
+        for figure in self.figures().filter(|_| self.files) {
+            if !figure.panels.is_empty() {
                 files.push((format!("{}.svg", figure.id), figure.whole_svg().text.into_bytes()));
-                files.push((format!("{}.csv", figure.id), figure.data.csv()?));
             }
-            for table in self.tables() {
-                files.push((format!("{}.csv", table.id), table.data.csv()?));
-            }
+            files.push((format!("{}.csv", figure.id), csv(&figure.data)?));
         }
         let mut written = Vec::new();
         for (name, bytes) in files {
@@ -212,19 +209,14 @@ impl Page {
             Block::Warning(text) => html! { p.warning { strong { "Warning: " } (marked(text)) } },
             Block::Link(file, text) => html! { p { a href=(file) { (text) } } },
             Block::Figure(figure) => html! {
-                figure id=(figure.id) {
+                figure class=[figure.panels.is_empty().then_some("table")] id=(figure.id) {
                     h3 { (figure.title) }
-                    div.panels {
-                        @for panel in &figure.panels { (drawing(panel, &figure.title)) }
+                    @if figure.panels.is_empty() { (rows(&figure.data, &figure.title)) } @else {
+                        div.panels {
+                            @for panel in &figure.panels { (drawing(panel, &figure.title)) }
+                        }
                     }
-                    figcaption { (marked(&figure.caption)) (self.origin(&figure.id, &figure.command, true)) }
-                }
-            },
-            Block::Table(table) => html! {
-                figure.table id=(table.id) {
-                    h3 { (table.title) }
-                    (rows(&table.data, &table.title))
-                    figcaption { (marked(&table.caption)) (self.origin(&table.id, &table.command, false)) }
+                    figcaption { (marked(&figure.caption)) (self.origin(figure)) }
                 }
             },
             Block::Pictures(pictures) => html! {
@@ -241,13 +233,13 @@ impl Page {
     }
 
     /// The command that remakes a figure or table, and links to its numbers.
-    fn origin(&self, id: &str, command: &str, drawn: bool) -> Markup {
+    fn origin(&self, Figure { id, panels, .. }: &Figure) -> Markup {
         html! {
             div.origin {
-                @if !command.is_empty() { code { (command) } }
+                @if !self.command.is_empty() { code { (self.command) } }
                 @if self.files {
                     " " a href={ (id) ".csv" } { (id) ".csv" }
-                    @if drawn { " " a href={ (id) ".svg" } { (id) ".svg" } }
+                    @if !panels.is_empty() { " " a href={ (id) ".svg" } { (id) ".svg" } }
                 }
             }
         }
@@ -278,10 +270,8 @@ fn marked(text: &str) -> Markup {
     }
 }
 
-fn rows(data: &Records, title: &str) -> Markup {
-    // A column reads as numbers unless most of its cells are words, such as "over 200".
-    let words = |column: usize| data.rows.iter().filter(|row| matches!(row[column], Cell::Text(_))).count();
-    let numeric: Vec<bool> = (0..data.columns.len()).map(|column| 2 * words(column) <= data.rows.len()).collect();
+fn rows(data: &Results, title: &str) -> Markup {
+    let numeric: Vec<bool> = (0..data.columns.len()).map(|column| data.is_numeric(column)).collect();
     html! {
         div.scroll tabindex="0" role="region" aria-label=(title) {
             table {
@@ -297,7 +287,7 @@ fn rows(data: &Records, title: &str) -> Markup {
                     @for row in &data.rows {
                         tr { @for (cell, numeric) in row.iter().zip(&numeric) {
                             @let within = cell.shown().starts_with("  ").then_some("within");
-                            td class=[numeric.then_some("number").or(within)] data-value=[cell.value()] { (cell.shown()) }
+                            td class=[numeric.then_some("number").or(within)] data-value=[cell.numbers().0] { (cell.shown()) }
                         } }
                     }
                 }
@@ -306,23 +296,61 @@ fn rows(data: &Records, title: &str) -> Markup {
     }
 }
 
+/// Results as CSV, a header line first. A column with an uncertainty becomes two.
+///
+/// # Errors
+/// If the CSV library refuses, which it has no reason to.
+fn csv(data: &Results) -> Result<Vec<u8>> {
+    let has_spread = |value: &Value| matches!(value, Value::Spread(..) | Value::PercentSpread(..));
+    let has_spread = |column: usize| data.rows.iter().any(|row| has_spread(&row[column]));
+    let spread: Vec<bool> = (0..data.columns.len()).map(has_spread).collect();
+    let number = |number: Option<f64>| number.map_or_else(String::new, |number| number.to_string());
+    let fields = |value: &Value| match (value, value.numbers()) {
+        (Value::Text(text), _) => [text.clone(), String::new()],
+        (_, (value, spread)) => [number(value), number(spread)],
+    };
+    let names = data.columns.iter().map(|name| [name.clone(), format!("{name} ±")]).collect();
+    let rows = data.rows.iter().map(|row| row.iter().map(fields).collect());
+    let refused = |error: &dyn std::error::Error| bug(format!("cannot write CSV: {error}"));
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for row in std::iter::once(names).chain(rows) {
+        let row: Vec<[String; 2]> = row;
+        let columns = row.into_iter().zip(&spread);
+        let fields = columns.flat_map(|(fields, &spread)| fields.into_iter().take(1 + usize::from(spread)));
+        writer.write_record(fields).map_err(|error| refused(&error))?;
+    }
+    writer.into_inner().map_err(|error| refused(&error))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpate::row;
+
+    #[test]
+    fn csv_quotes_and_gives_uncertainties_their_own_column() {
+        let mut data = Results::new(["object", "accuracy"]);
+        data.push(row!["a, b", Value::PercentSpread(0.75, 0.01, 1)]);
+        data.push(["c"]);
+        assert_eq!(
+            String::from_utf8(csv(&data).unwrap()).unwrap(),
+            "object,accuracy,accuracy ±\n\"a, b\",0.75,0.01\nc,,\n"
+        );
+    }
 
     /// A page of one table.
-    fn page(title: &str, caption: &str, data: Records) -> Page {
+    fn page(title: &str, caption: &str, data: Results) -> Page {
         let mut section = Section::new("one", "One & only");
-        let command = "palpate report a b".into();
-        section.table(Table { id: "t".into(), title: "T".into(), caption: caption.into(), command, data });
+        section.figure(Figure::new("t", "T", caption, data));
+        let (title, command) = (title.into(), "palpate report a b".into());
         let facts = vec![("seed".into(), "1".into())];
-        Page { title: title.into(), summary: String::new(), sections: vec![section], facts, files: true }
+        Page { title, summary: String::new(), command, sections: vec![section], facts, files: true }
     }
 
     #[test]
     fn a_page_escapes_what_it_is_given_and_holds_everything_itself() {
-        let mut data = Records::new(["name", "value"]);
-        data.push(["<b>".into(), Cell::Number(2.0, 0)]);
+        let mut data = Results::new(["name", "value"]);
+        data.push(row!["<b>", 2_usize]);
         let html = page("A <page>", "See `palpate calibrate <model>`.", data).html();
         for part in [
             "A &lt;page&gt;",
@@ -344,14 +372,7 @@ mod tests {
     fn panels_are_tiled_into_one_drawing() {
         let text = "<svg width=\"500\" height=\"100\"></svg>\n".into();
         let panel = Svg { text, width: 500, height: 100, narrow: None };
-        let figure = Figure {
-            id: "f".into(),
-            title: String::new(),
-            caption: String::new(),
-            command: String::new(),
-            panels: vec![panel; 3],
-            data: Records::default(),
-        };
+        let figure = Figure::new("f", "", "", Results::default()).drawn(vec![panel; 3]);
         let whole = figure.whole_svg();
         assert_eq!((whole.width, whole.height), (1000, 200));
         assert!(whole.text.contains("<svg x=\"500\" y=\"0\"") && whole.text.contains("<svg x=\"0\" y=\"100\""));

@@ -2,7 +2,6 @@
 //!
 //! ```text
 //! color ──► axis ──► chart ──► heat map ──► document (html) ──► a file
-//!            └─────► table ───────────────────┘
 //! mesh  ──► render: PNG        mesh, lines ──► scene: for a page of its own
 //! ```
 
@@ -14,4 +13,3 @@ pub(crate) mod heat_map;
 pub(crate) mod html;
 pub mod render;
 pub(crate) mod scene;
-pub mod table;

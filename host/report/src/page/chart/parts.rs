@@ -5,7 +5,7 @@ use plotters::style::RGBColor;
 
 /// A drawing as SVG text, with its natural size in pixels.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Svg {
+pub(crate) struct Svg {
     /// The `<svg>` element.
     pub(crate) text: String,
     /// Natural width.
