@@ -23,6 +23,8 @@ pub(super) struct Demand<'a> {
     /// Without noise, for other models too.
     kept: &'a [OnceLock<Touch>],
     noise: Option<noise::Stream>,
+    /// For each instance the number of touches of those before it.
+    starts: Vec<usize>,
 }
 
 impl<'a> Demand<'a> {
@@ -34,7 +36,11 @@ impl<'a> Demand<'a> {
         window: Option<u32>,
         kept: &'a [OnceLock<Touch>],
     ) -> Self {
-        Self { sampler, first, instances: instances.max(1), window, kept, noise: None }
+        let demand =
+            Self { sampler, first, instances: instances.max(1), window, kept, noise: None, starts: Vec::new() };
+        let instances = demand.by_instance();
+        let starts = instances.iter().scan(0, |next, pool| Some(std::mem::replace(next, *next + pool.len())));
+        Self { starts: starts.collect(), ..demand }
     }
 
     /// Adds noise without a bias to each touch.
@@ -54,11 +60,16 @@ impl<'a> Demand<'a> {
 
     /// The positions of the touches of each instance, ascending; of those instances that have any.
     pub(super) fn pools(&self) -> Vec<Vec<u32>> {
+        let mut pools = self.by_instance();
+        pools.retain(|pool| !pool.is_empty());
+        pools
+    }
+
+    fn by_instance(&self) -> Vec<Vec<u32>> {
         let mut pools = vec![Vec::new(); self.instances];
         // Below the number of instances, and of samples, which are counted in 32 bits.
         let offset = (self.first % self.instances as u64) as usize;
         (0..self.len()).for_each(|position| pools[(offset + position) % self.instances].push(position as u32));
-        pools.retain(|pool| !pool.is_empty());
         pools
     }
 
@@ -81,7 +92,11 @@ impl<'a> Demand<'a> {
                 *kept.get_or_init(|| touch)
             }
         };
-        let noisy = |noise: &noise::Stream| noise.add(&touch, position as usize, position.into());
+        // As if the touches of one instance came after those of another.
+        let turn = (self.first % self.instances as u64) as usize + position as usize;
+        let before = self.starts.get(turn % self.instances).copied().unwrap_or(0);
+        let index = before + position as usize / self.instances;
+        let noisy = |noise: &noise::Stream| noise.add(&touch, index, index as u64);
         Ok(self.noise.as_ref().map_or(touch, |noise| hand::within(&noisy(noise), self.window)))
     }
 }

@@ -20,7 +20,7 @@ const HALVINGS: usize = 24;
 /// touch is evidence.
 pub fn temperature(model: &Model<'_>, dataset: &Dataset, known: &[usize]) -> f64 {
     let evidence = |touched: &ObjectTouches| -> Vec<Touch> {
-        touched.touches().iter().filter(|touch| model.accepts(touch).is_ok()).take(MOST).copied().collect()
+        touched.in_turns().filter(|touch| model.accepts(touch).is_ok()).take(MOST).copied().collect()
     };
     let candidate = Candidate::Compiled(model);
     let outputs = |(touched, &known): (&ObjectTouches, &usize)| {

@@ -60,9 +60,10 @@ fn used(model: &Model<'_>, supply: &mut TouchSupply<'_>, limit: Limit) -> Vec<Ve
     watched.used
 }
 
-/// The sources or robots that made the touches of each sequence: of so many, in turn.
-fn in_turns(used: Vec<Vec<u32>>, count: u32) -> Vec<BTreeSet<u32>> {
-    used.into_iter().map(|used| used.into_iter().map(|touch| touch % count).collect()).collect()
+/// The pools that the touches of each sequence are of.
+fn pools_of(used: Vec<Vec<u32>>, touched: &ObjectTouches) -> Vec<BTreeSet<usize>> {
+    let of = |touch: u32| touched.pools().iter().position(|pool| pool.range.contains(&(touch as usize))).unwrap();
+    used.into_iter().map(|used| used.into_iter().map(of).collect()).collect()
 }
 
 /// Equal touches, made by `robots` robots in turn, whose biases change nothing.
@@ -133,8 +134,8 @@ fn every_robot_makes_one_sequence() {
     let limit = Limit { margin: 6.0, max_touches: 50 };
     let sequences = follow(&MODEL.model(), &mut supplies(&dataset), &[90; 3], limit, &()).unwrap();
     assert_eq!(sequences.len(), 3 * 20);
-    for mut supply in supplies(&dataset) {
-        let robots: Vec<BTreeSet<u32>> = in_turns(used(&MODEL.model(), &mut supply, limit), 20);
+    for (mut supply, touched) in supplies(&dataset).into_iter().zip(&dataset.objects) {
+        let robots = pools_of(used(&MODEL.model(), &mut supply, limit), touched);
         assert!(robots.iter().all(|robots| robots.len() == 1), "{robots:?}");
         assert_eq!(robots.into_iter().flatten().collect::<BTreeSet<_>>().len(), 20);
     }
@@ -149,7 +150,7 @@ fn every_sequence_is_of_one_instance() {
     let mut supply = [TouchSupply::new(0, &touched, 1)];
     let sequences = follow(&MODEL.model(), &mut supply, &[30], limit, &()).unwrap();
     assert_eq!(sequences.len(), 30);
-    let instances = in_turns(used(&MODEL.model(), &mut TouchSupply::new(0, &touched, 1), limit), 3);
+    let instances = pools_of(used(&MODEL.model(), &mut TouchSupply::new(0, &touched, 1), limit), &touched);
     assert!(instances.len() > 30 && instances.iter().all(|instances| instances.len() == 1), "{instances:?}");
 }
 

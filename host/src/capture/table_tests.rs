@@ -231,7 +231,7 @@ fn a_capture_of_another_scene_or_other_weights_replaces_none_unless_it_is_forced
     weighed.placement_weights = vec![("+z".into(), 1.0)];
     for (other, object) in [(&floating, brick), (&steeper, brick), (&origin(50), &weighed)] {
         let again = run(other.clone(), object, false).unwrap_err();
-        assert!(again.contains("holds brick.txt, dataset.json, which this capture would not write"), "{again}");
+        assert!(again.contains("holds brick, dataset.json, which this capture would not write"), "{again}");
     }
     run(origin(50), brick, false).unwrap();
     run(floating, brick, true).unwrap();

@@ -90,10 +90,10 @@ impl PoolFile {
         }
     }
 
-    /// The source of the touches.
-    pub(crate) fn source(&self) -> Source {
+    /// The source of the touches, of the file at this position among those of the object.
+    pub(crate) fn source(&self, number: usize) -> Source {
         match (&self.recorded, &self.placement, &self.instance) {
-            (Some(recorded), ..) => Source::Recording(recorded.clone()),
+            (Some(recorded), ..) => Source::Recording(Recorded { number, ..recorded.clone() }),
             (_, Some(Lying { name, weight }), instance) => {
                 let millionths = (weight * 1e6).round().clamp(0.0, 1e6) as u32;
                 Source::Placement { instance: instance.clone(), placement: name.clone(), millionths }

@@ -197,6 +197,12 @@ impl ObjectTouches {
         self.touches.get(pool.range.clone()).unwrap_or_default()
     }
 
+    /// The touches of the pools in turn: those that come first are of all pools.
+    pub(crate) fn in_turns(&self) -> impl Iterator<Item = &Touch> {
+        let longest = self.pools.iter().map(|pool| pool.range.len()).max().unwrap_or(0);
+        (0..longest).flat_map(move |rank| self.pools.iter().filter_map(move |pool| self.of_pool(pool).get(rank)))
+    }
+
     /// Refuses the touches if many of them take longer than `longest`, as files of touches are refused.
     ///
     /// # Errors
@@ -493,7 +499,7 @@ mod tests {
             assert_eq!((found.len(), noisy.has_robots()), (robots, robots > 1));
             // A part of them is of the same robots, and these stay with what is added later.
             assert_eq!(noisy.part(1..3, 5).pools().len(), pools);
-            let again = noisy.noisy(&noise, 2, 7);
+            let again = noisy.noisy(&noise, 2, if robots > 1 { 7 } else { 1 });
             assert!(again.pools().iter().map(|pool| pool.robot).eq(noisy.pools().iter().map(|pool| pool.robot)));
         }
     }

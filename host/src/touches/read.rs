@@ -61,7 +61,7 @@ fn listed(directory: &Path, listing: &Listing, sink: &mut dyn Sink) -> Result<Ve
     let mut objects = Vec::with_capacity(listing.objects.len());
     for entry in &listing.objects {
         let mut parts = Vec::with_capacity(entry.pools.len());
-        for pool in &entry.pools {
+        for (number, pool) in entry.pools.iter().enumerate() {
             let file = entry.path(directory, pool);
             let touches = read_listed(entry, pool, &file, &listing.origin.longest(), sink)?;
             if let Some(first) = touches.first() {
@@ -71,7 +71,7 @@ fn listed(directory: &Path, listing: &Listing, sink: &mut dyn Sink) -> Result<Ve
                     sink.fault(other.at(Place::file(&file)))?;
                 }
             }
-            parts.push((pool.source(), pool.robot, touches));
+            parts.push((pool.source(number), pool.robot, touches));
         }
         let file = entry.pools.first().map_or_else(PathBuf::new, |pool| entry.path(directory, pool));
         let touches = ObjectTouches::of_parts(&entry.name, parts).of_origin(&listing.origin);

@@ -6,6 +6,9 @@ pub struct Recorded {
     /// The placement that the object lay in on a table, where the recording states one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub placement: Option<String>,
+    /// Its position among the recordings of the object, which tells those apart that began in the same second.
+    #[serde(skip)]
+    pub number: usize,
     /// Time at which it began, in UTC: `2026-11-22T11:00:00Z`.
     pub began: String,
     /// Source of the touches: a port or a file.

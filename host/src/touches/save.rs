@@ -107,8 +107,8 @@ mod tests {
         let instances = ["cup", "vase"].map(|name| ObjectTouches::in_turn(name, touches(31), &names, 0));
         let recordings = ["cup", "vase"].map(|object| {
             let began = [("2026-11-22T11:00:00Z", 20), ("2026-11-22T12:00:00Z", 4), ("2026-11-22T13:00:00Z", 7)];
-            let parts = began.map(|(began, count)| {
-                let recorded = Recorded { began: began.into(), ..Recorded::default() };
+            let parts = began.into_iter().enumerate().map(|(number, (began, count))| {
+                let recorded = Recorded { number, began: began.into(), ..Recorded::default() };
                 (Source::Recording(recorded), None, touches(count))
             });
             ObjectTouches::of_parts(object, parts)

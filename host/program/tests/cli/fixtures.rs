@@ -179,12 +179,9 @@ pub(crate) static TABLE: Fixture = Fixture::new(|at| {
     succeeds(at, "export e.json -o model.palpate");
     for object in read(&at.join("robot/dataset.json"))["objects"].as_array().unwrap() {
         let name = object["name"].as_str().unwrap();
-        let placements = object["placements"].as_array().unwrap();
-        let text = fs::read_to_string(at.join(format!("robot/{name}.txt"))).unwrap();
-        for (number, placement) in placements.iter().enumerate() {
-            let placement = placement["name"].as_str().unwrap();
-            let lines = text.split_inclusive('\n').skip(number).step_by(placements.len());
-            fs::write(at.join(format!("{name}{placement}.txt")), lines.collect::<String>()).unwrap();
+        for pool in object["pools"].as_array().unwrap() {
+            let [placement, file] = [&pool["placement"]["name"], &pool["file"]].map(|text| text.as_str().unwrap());
+            fs::copy(at.join(format!("robot/{name}/{file}.txt")), at.join(format!("{name}{placement}.txt"))).unwrap();
             let record = format!("data record {name}{placement}.txt -o stated --object {name}/{placement} --pose");
             succeeds(at, &record);
         }

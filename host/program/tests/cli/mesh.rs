@@ -108,7 +108,7 @@ fn objects_that_cannot_be_touched_are_named_with_their_sizes_before_anything_is_
     assert!(!at.join("data").exists());
     let said = captured(at, "one.obj flat.obj -o data --touches 5 --scene table --skip-bad", 0);
     assert!(said.contains("palpate: left out: flat (10 × 8.89 × 0 units): none of"), "{said}");
-    assert_eq!(crate::listing(&at.join("data")), ["dataset.json", "one.txt"]);
+    assert_eq!(crate::listing(&at.join("data")), ["dataset.json", "one"]);
 }
 
 #[test]

@@ -90,7 +90,7 @@ fn with_force_a_data_set_is_replaced_and_other_files_stay() {
     fails(at, again, 1, "out: holds ball.txt, dataset.json, notes.md, which this capture would not write … --force");
     succeeds(at, &format!("{again} --force"));
     assert_eq!(listing(&out), ["ball.txt", "dataset.json", "notes.md"]);
-    assert_eq!(read(&out.join("dataset.json"))["objects"][0]["touches"], 5);
+    assert_eq!(read(&out.join("dataset.json"))["objects"][0]["pools"][0]["touches"], 5);
     assert_eq!(std::fs::read_to_string(out.join("notes.md")).unwrap(), FOREIGN);
     let current =
         command(["capture", "ball.obj", "-o", ".", "--touches", "3", "--force"]).current_dir(at.join("")).output();

@@ -1,8 +1,9 @@
 //! Probe files, true sizes and objects with several instances, as a user gives them.
 
 use crate::{Folder, fails, figures, globe, read, succeeds};
-use serde_json::{Value, json};
+use serde_json::Value;
 use std::fs;
+use std::path::Path;
 
 const MILLIMETERS: &str = "unit = \"mm\"\nradius = 0.1\nspacing = 0.3\nspeed = 2.0\n";
 const PUBLISHED: &str = "radius = 0.15\nspacing = 1.5\nspeed = 10\n";
@@ -111,6 +112,12 @@ fn run_and_view_take_the_probe_file() {
     fails(at, "run meshes -o out --true-size mm", 2, "--probe is not given");
 }
 
+/// The names of an object's instances in a data set.
+fn instances(data: &Path, object: usize) -> Vec<String> {
+    let listed = read(&data.join("dataset.json"))["objects"][object]["pools"].take();
+    listed.as_array().unwrap().iter().map(|pool| pool["instance"].as_str().unwrap().to_owned()).collect()
+}
+
 #[test]
 fn a_directory_of_meshes_is_one_object_with_instances() {
     let at = &Folder::new();
@@ -123,7 +130,7 @@ fn a_directory_of_meshes_is_one_object_with_instances() {
     fails(at, "capture meshes -o data --touches 300", 1, expected);
     let capture = "capture meshes -o data --touches 300 --instances";
     assert_eq!(figures(at, capture)["objects"].as_array().unwrap().len(), 2);
-    assert_eq!(read(&at.join("data/dataset.json"))["objects"][1]["instances"], json!(["a", "b", "c"]));
+    assert_eq!(instances(&at.join("data"), 1), ["a", "b", "c"]);
     succeeds(at, "train data -o ensemble.json --trees rounds=3");
     succeeds(at, "capture meshes -o unseen --touches 300 --seed 2 --instances");
     assert_eq!(figures(at, "evaluate ensemble.json unseen --sequences 50")["touches"], 600);
@@ -137,7 +144,7 @@ fn built_in_objects_vary_in_as_many_instances_as_asked_for() {
     let at = &Folder::new();
     let [one, other] = ["1", "2"].map(|seed| {
         succeeds(at, &format!("capture bowl --touches 60 --instances 2 -o {seed} --seed {seed}"));
-        read(&at.join(seed).join("dataset.json"))["objects"][0]["instances"].as_array().unwrap().clone()
+        instances(&at.join(seed), 0)
     });
     assert_eq!(one.len(), 2);
     assert!(one.iter().all(|name| !other.contains(name)));

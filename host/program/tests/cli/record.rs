@@ -8,7 +8,7 @@ use palpate_shared::link::{
     Decision, Device, DeviceEnd, EVENTS, Event, FaultKind, ModelInfo, Refusal, TouchMessage, VerdictMessage,
 };
 use palpate_shared::{ContactTime, Touch};
-use serde_json::json as value;
+use serde_json::{Value, json as value};
 use std::cell::Cell;
 use std::fs;
 use std::io::{Read, Write};
@@ -45,11 +45,11 @@ fn lines_become_a_data_set_that_says_what_it_is_and_grows() {
     let stated = read(&at.join("recorded/dataset.json"));
     assert_eq!(stated["settings"]["approaches"], true);
     assert_eq!(stated["settings"]["probe"]["spacing"], 2.0);
-    let sessions = stated["recorded"].as_array().unwrap();
-    let said = |index: usize| (&sessions[index]["object"], &sessions[index]["touches"], &sessions[index]["source"]);
-    assert_eq!(said(0), (&value!("bowl"), &value!(3), &value!("standard input")));
-    assert_eq!((said(1).1, said(2).0), (&value!(1), &value!("mug")));
-    let began = sessions[0]["began"].as_str().unwrap();
+    let pool = |object: usize, pool: usize| &stated["objects"][object]["pools"][pool];
+    assert_eq!([pool(0, 0), pool(0, 1), pool(1, 0)].map(|pool| &pool["touches"]), [3, 1, 2]);
+    assert_eq!([pool(0, 0), pool(0, 1)].map(|pool| &pool["file"]), [&Value::Null, &value!("2")]);
+    assert_eq!(pool(0, 0)["recorded"]["source"], "standard input");
+    let began = pool(0, 0)["recorded"]["began"].as_str().unwrap();
     assert!(began.starts_with("20") && began.ends_with('Z') && began.len() == 20, "{began}");
     let dataset = Dataset::read(&at.join("recorded")).unwrap();
     assert_eq!((dataset.names(), dataset.len()), (vec!["bowl".to_owned(), "mug".to_owned()], 6));
@@ -233,9 +233,10 @@ fn a_pulled_cable_neither_loses_a_touch_that_the_chip_keeps_nor_doubles_one() {
     assert!(said.contains("the connection to the chip was lost") && said.contains("Waiting for it."), "{said}");
     assert!(said.contains("warning: finger 3: silent") && said.contains("2 reports of the chip were lost"), "{said}");
     let stated = read(&at.join("recorded/dataset.json"));
-    assert_eq!(stated["recorded"].as_array().unwrap().len(), 1, "{stated}");
-    assert_eq!(stated["recorded"][0]["firmware"], "three fingers 1.0");
-    assert_eq!((&stated["recorded"][0]["source"], &stated["objects"][0]["touches"]), (&value!(port), &value!(11)));
+    let pools = stated["objects"][0]["pools"].as_array().unwrap();
+    assert_eq!(pools.len(), 1, "{stated}");
+    assert_eq!(pools[0]["recorded"]["firmware"], "three fingers 1.0");
+    assert_eq!((&pools[0]["recorded"]["source"], &pools[0]["touches"]), (&value!(port), &value!(11)));
 }
 
 #[test]

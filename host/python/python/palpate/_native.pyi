@@ -72,7 +72,8 @@ class DataSet:
         `direction` and `alignment` are unit vectors, `position` where the hand was at the first contact, on a table, in
         millimeters (the `probe` is in millimeters then). Without a `probe` nothing is known about it. `instances` are numbers
         that say which mesh, or recording, of its object each touch is of, where objects have several: a sequence is of one.
-        `robots` are numbers that say which robot made each touch, where robots differ: a sequence is of one, too.
+        `robots` are numbers that say which robot made each touch, where robots differ: a sequence is of one, too. The data set has
+        the touches by object, instance and robot.
         """
     @staticmethod
     def from_pandas(table: DataFrame, *, probe: Probe | None = None, approaches: bool = False) -> DataSet:
@@ -144,8 +145,9 @@ class DataSet:
         """
     def to_text(self, /, directory: str | PathLike[str]) -> None:
         """
-        Writes `<object>.txt` for each object, one line per touch, and, if the probe is known, `dataset.json`, into a directory
-        that holds no touches yet: what `read` and `palpate train` read. Which touch is of which instance or recording is kept.
+        Writes `<object>.txt` for each object, or `<object>/1.txt`, `<object>/2.txt` and so on for its instances, recordings and robots,
+        one line per touch, and, if the probe is known, `dataset.json`, into a directory that holds no touches yet: what `read` and
+        `palpate train` read.
         """
     @property
     def warnings(self, /) -> list[str]:
