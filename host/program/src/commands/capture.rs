@@ -72,7 +72,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     );
     settings.check()?;
     let mut objects = arguments.size.objects(&arguments.sources, settings.origin.seed)?;
-    arguments.scene.weigh(&mut objects)?;
+    arguments.scene.weights.weigh(&mut objects)?;
     let objects = arguments.size.touchable(objects, &settings.origin)?;
     // Shapes of the background are as they are meant to be.
     let has_background =

@@ -1,4 +1,4 @@
-//! `palpate probe`, and `palpate probe fit`.
+//! `palpate probe fit`.
 
 use super::Global;
 use super::numbers::count;
@@ -16,19 +16,6 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
-#[command(arg_required_else_help = true, subcommand_required = true)]
-pub(crate) struct Arguments {
-    #[command(subcommand)]
-    command: Command,
-}
-
-#[derive(clap::Subcommand)]
-enum Command {
-    /// Measure how your probe differs from the ideal, from its touches
-    Fit(Box<FitArguments>),
-}
-
-#[derive(clap::Args)]
 #[command(after_help = "\
 RECORDED is a data set that your probe made, of objects whose meshes you have, matched by their names. The probe that explains the recorded touches best is written: how fast it really is, how late each finger touches, its noise, what it misses, its timer. `palpate capture --probe probe.toml` then gives touches as it would.
 
@@ -42,7 +29,7 @@ Examples:
   palpate probe fit recorded meshes/ -o fitted.toml --probe probe.toml \\
       --true-size mm
   palpate probe fit recorded meshes/ -o probe.toml --scene table")]
-struct FitArguments {
+pub(crate) struct Arguments {
     /// The recorded touches: a directory with a file for each object
     #[arg(value_name = "RECORDED")]
     recorded: PathBuf,
@@ -65,11 +52,6 @@ struct FitArguments {
 }
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
-    let Command::Fit(arguments) = arguments.command;
-    run_fit(&arguments, global)
-}
-
-fn run_fit(arguments: &FitArguments, global: &Global) -> Result<()> {
     let inputs = super::files_of(&arguments.recorded).into_iter().chain(arguments.plate.clone());
     output::admit(&arguments.output, inputs)?;
     let recorded = super::checked(palpate::touches::Dataset::read_any(&arguments.recorded)?);
@@ -93,7 +75,7 @@ fn run_fit(arguments: &FitArguments, global: &Global) -> Result<()> {
         return Err(Error::setting("scene", "floating", allowed));
     }
     let mut objects = arguments.size.objects(&arguments.sources, global.seed())?;
-    arguments.scene.weigh(&mut objects)?;
+    arguments.scene.weights.weigh(&mut objects)?;
     let plate = arguments.plate.as_deref().map(read_touches).transpose()?;
     let settings = with!(Settings::default(), origin, approaches = arguments.approaches, seed = global.seed());
     let found = fit(&recorded, &objects, plate.as_deref(), &settings, &Bar::new())?;

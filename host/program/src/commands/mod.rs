@@ -1,5 +1,41 @@
 //! One file per command: its arguments, its help, and the call into the library.
 
+/// Declares the enum that clap parses and the dispatch, from one list.
+macro_rules! commands {
+    ($($(#[$meta:meta])* $name:ident => $module:ident,)*) => {
+        #[derive(clap::Subcommand)]
+        enum Command {
+            $($(#[$meta])* $name(Box<$module::Arguments>),)*
+        }
+
+        impl Command {
+            fn run(self, global: &$crate::commands::Global) -> palpate::Result<()> {
+                match self {
+                    $(Self::$name(arguments) => $module::run(*arguments, global),)*
+                }
+            }
+        }
+    };
+}
+
+/// Declares a command that holds others, from their list.
+macro_rules! group {
+    ($($list:tt)*) => {
+        commands! { $($list)* }
+
+        #[derive(clap::Args)]
+        #[command(arg_required_else_help = true, subcommand_required = true)]
+        pub(crate) struct Arguments {
+            #[command(subcommand)]
+            command: Command,
+        }
+
+        pub(crate) fn run(arguments: Arguments, global: &$crate::commands::Global) -> palpate::Result<()> {
+            arguments.command.run(global)
+        }
+    };
+}
+
 mod calibrate;
 mod capture;
 mod chips;
@@ -15,6 +51,7 @@ mod keys;
 mod kinds;
 mod link;
 mod maps;
+mod measure;
 mod numbers;
 mod parity;
 mod plan;
@@ -43,31 +80,13 @@ mod view;
 mod watch;
 
 use clap::error::{ContextKind, ContextValue};
-use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser};
 use palpate::error::{Kind, Place, problem};
 use palpate::touches::{Dataset, Finding, Listing, Log};
 use palpate::{Error, Result, output};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
-
-/// Declares the enum that clap parses and the dispatch, from one list.
-macro_rules! commands {
-    ($($(#[$meta:meta])* $name:ident => $module:ident,)*) => {
-        #[derive(Subcommand)]
-        enum Command {
-            $($(#[$meta])* $name($module::Arguments),)*
-        }
-
-        impl Command {
-            fn run(self, global: &Global) -> Result<()> {
-                match self {
-                    $(Self::$name(arguments) => $module::run(arguments, global),)*
-                }
-            }
-        }
-    };
-}
 
 commands! {
     /// Do all of it: capture, train, export, recognize, report
@@ -107,7 +126,7 @@ commands! {
     /// Check and record data sets of touches; write built-in objects
     Data => data,
     /// Measure how your probe differs from the ideal
-    Probe => fit,
+    Probe => measure,
     /// Print a script that completes this program's commands and options in a shell
     #[command(hide = true)]
     Completions => completions,
@@ -166,6 +185,13 @@ impl Global {
     /// Prints a result and what was written to `path`, as [`output::print_about`].
     fn print_about(&self, path: &Path, result: &impl serde::Serialize, text: impl FnOnce() -> String) -> Result<()> {
         if self.json { output::print_json_about(path, result) } else { output::print_about(path, &text()) }
+    }
+
+    /// Writes a page, and prints where it is.
+    fn write_page(&self, path: &Path, html: &str) -> Result<()> {
+        output::write_bytes(path, html.as_bytes())?;
+        let text = || format!("{}: open it in a browser\n", path.display());
+        self.print_about(path, &serde_json::json!({ "page": path }), text)
     }
 
     /// Makes the options count that concern the whole process.

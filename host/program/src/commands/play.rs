@@ -60,9 +60,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         contenders.push(Contender::household()?);
     }
     let page = play::page(&objects, &contenders, &Settings { origin, noise, command: shell::typed() })?;
-    output::write_bytes(&output, page.as_bytes())?;
-    let text = || format!("{}: open it in a browser\n", output.display());
-    global.print_about(&output, &serde_json::json!({ "page": output }), text)
+    global.write_page(&output, &page)
 }
 
 /// A model for approaches of this origin.

@@ -15,7 +15,7 @@ pub(crate) struct SceneArguments {
     #[arg(long, value_name = "DEGREES")]
     cone: Option<f64>,
     #[command(flatten)]
-    weights: PlacementArguments,
+    pub(crate) weights: PlacementArguments,
 }
 
 /// The placements of objects on a table, and how frequent they are.
@@ -53,14 +53,6 @@ impl SceneArguments {
         };
         scene.check()?;
         Ok(scene)
-    }
-
-    /// Gives objects the weights of their placements.
-    ///
-    /// # Errors
-    /// The ones of [`PlacementArguments::weigh`].
-    pub(crate) fn weigh(&self, objects: &mut [Object]) -> Result<()> {
-        self.weights.weigh(objects)
     }
 }
 

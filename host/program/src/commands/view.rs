@@ -59,7 +59,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let origin = size.origin(Origin::default())?;
     refuse_unstated(size)?;
     let mut object = [size.object(source)?];
-    arguments.scene.weigh(&mut object)?;
+    arguments.scene.weights.weigh(&mut object)?;
     let [object] = object;
     let length = object.instances().next().map_or(Ok(0.0), |first| origin.length_of(&object, first))?;
     let probe = origin.probe;

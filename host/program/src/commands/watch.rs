@@ -27,7 +27,5 @@ pub(crate) fn run(Arguments { model, output }: Arguments, global: &Global) -> Re
     output::admit(&output, &model)?;
     let read = |path: &PathBuf| kinds::compiled(path, ModelKind::Touches, "watch");
     let model = model.as_ref().map(read).transpose()?;
-    output::write_bytes(&output, watch::page(model.as_ref(), &shell::typed())?.as_bytes())?;
-    let text = || format!("{}: open it in a browser that has Web Serial\n", output.display());
-    global.print_about(&output, &serde_json::json!({ "page": output }), text)
+    global.write_page(&output, &watch::page(model.as_ref(), &shell::typed())?)
 }

@@ -23,7 +23,7 @@ pub(super) struct Arguments {
     directory: PathBuf,
 }
 
-pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
+pub(super) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let check = Check::of(&arguments.directory)?;
     global.print(&check, || text(&check))?;
     match check.wrong() {

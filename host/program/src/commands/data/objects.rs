@@ -44,9 +44,9 @@ struct Written {
     triangles: usize,
 }
 
-pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
+pub(super) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     output::refuse_stdout(&arguments.output)?;
-    let (made, files) = made(arguments)?;
+    let (made, files) = made(&arguments)?;
     tell(&made);
     let meshes: Vec<_> = made.iter().flat_map(|object| meshes(object, &arguments.output)).collect();
     for (file, _) in &meshes {

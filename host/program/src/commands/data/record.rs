@@ -45,8 +45,8 @@ pub(crate) struct Arguments {
     line: LineOptions,
 }
 
-pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
-    let Arguments { source, output: directory, object, record, .. } = arguments;
+pub(super) fn run(arguments: Arguments, global: &Global) -> Result<()> {
+    let Arguments { source, output: directory, object, record, .. } = &arguments;
     output::refuse_stdout(directory)?;
     if is_chip(source) {
         if record.has_position() {

@@ -49,8 +49,8 @@ pub(super) struct Arguments {
     table: TableArguments,
 }
 
-pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
-    let Arguments { model, sources, recorded, output: to, promise, table, .. } = arguments;
+pub(super) fn run(arguments: Arguments, global: &Global) -> Result<()> {
+    let Arguments { model, sources, recorded, output: to, promise, table, .. } = &arguments;
     output::admit(to, recorded.as_deref().map(files_of).into_iter().flatten().chain([model.clone()]))?;
     let promise = calibrate::Terms { rate: promise.error_rate, confidence: promise.confidence, per: Per::Average };
     let Table { file, standing, probe, terms } = table.table(model, sources, promise, global.seed(), "calibrate")?;

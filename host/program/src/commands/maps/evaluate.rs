@@ -30,8 +30,8 @@ pub(super) struct Arguments {
     table: TableArguments,
 }
 
-pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
-    let Arguments { model, sources, table } = arguments;
+pub(super) fn run(arguments: Arguments, global: &Global) -> Result<()> {
+    let Arguments { model, sources, table } = &arguments;
     // An evaluation promises nothing.
     let promise = calibrate::Terms { rate: 0.01, confidence: 0.95, per: Per::Average };
     let Table { file, standing, probe, terms } = table.table(model, sources, promise, global.seed(), "evaluate")?;

@@ -1,9 +1,9 @@
 //! `palpate maps explore`.
 
 use super::recognize::Next;
-use crate::commands::kinds;
 use crate::commands::recognize_lines::{Event, each_of};
 use crate::commands::shape::noise;
+use crate::commands::{Global, kinds};
 use palpate::locate::{self, Shape};
 use palpate::output;
 use palpate::probe::file::ProbeFile;
@@ -78,8 +78,8 @@ fn hand(path: &Path) -> Result<ProbeFile> {
     Ok(ProbeFile { probe, unit: Length::Millimeter, real: locate::stated(&maps).noise(probe.speed) })
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<()> {
-    let &Arguments { known: goal, workspace: half, .. } = arguments;
+pub(super) fn run(arguments: Arguments, _: &Global) -> Result<()> {
+    let Arguments { known: goal, workspace: half, .. } = arguments;
     let file = hand(&arguments.hand)?;
     if !(1.0..=200.0).contains(&half) {
         return Err(Error::setting("workspace", half, "a number of millimeters from 1 to 200"));

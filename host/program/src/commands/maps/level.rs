@@ -26,8 +26,8 @@ pub(super) struct Arguments {
     probe: ProbeArguments,
 }
 
-pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
-    let Arguments { presses: path, output: to, probe } = arguments;
+pub(super) fn run(arguments: Arguments, global: &Global) -> Result<()> {
+    let Arguments { presses: path, output: to, probe } = &arguments;
     output::admit(to, [path])?;
     let probe = shape::hand(probe)?.probe;
     let mut presses = Vec::new();

@@ -11,47 +11,23 @@ mod view;
 
 pub(super) use recognize::print_located;
 
-use super::Global;
-use palpate::Result;
-
-#[derive(clap::Args)]
-#[command(arg_required_else_help = true, subcommand_required = true)]
-pub(crate) struct Arguments {
-    #[command(subcommand)]
-    command: Command,
-}
-
-#[derive(clap::Subcommand)]
-enum Command {
+group! {
     /// Make maps of objects, from meshes or recorded touches
-    Train(Box<train::Arguments>),
+    Train => train,
     /// Set the threshold that keeps an error rate, on a simulated table or on recordings
-    Calibrate(Box<calibrate::Arguments>),
+    Calibrate => calibrate,
     /// Measure on a simulated table how often names and places are right
-    Evaluate(Box<evaluate::Arguments>),
+    Evaluate => evaluate,
     /// Recognize objects and where they lie, from a stream of touches
-    Recognize(Box<recognize::Arguments>),
+    Recognize => recognize,
     /// Say where to touch an object without a mesh, until its heights are known
-    Explore(Box<explore::Arguments>),
+    Explore => explore,
     /// Measure the table and the fingertips, by presses on the bare table
-    Level(Box<level::Arguments>),
+    Level => level,
     /// Show the map of a touched object on a page, or two of them
-    View(Box<view::Arguments>),
+    View => view,
     /// Make a page on which a hidden object is found on a table
-    Play(Box<play::Arguments>),
-}
-
-pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
-    match arguments.command {
-        Command::Train(arguments) => train::run(*arguments, global),
-        Command::Calibrate(arguments) => calibrate::run(&arguments, global),
-        Command::Evaluate(arguments) => evaluate::run(&arguments, global),
-        Command::Recognize(arguments) => recognize::run(&arguments, global),
-        Command::Explore(arguments) => explore::run(&arguments),
-        Command::Level(arguments) => level::run(&arguments, global),
-        Command::View(arguments) => view::run(&arguments, global),
-        Command::Play(arguments) => play::run(*arguments, global),
-    }
+    Play => play,
 }
 
 /// The name of a placement with that of its object.

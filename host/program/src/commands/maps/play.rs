@@ -53,7 +53,5 @@ pub(super) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let stated = size.probe.read()?.map(|file| file.real).filter(|real| !real.is_none());
     let noise = real.on_table(stated.unwrap_or_else(|| Real::default().noise(origin.probe.speed)))?;
     let page = play::table(&objects, &Settings { origin, noise, command: shell::typed() }, &Bar::new())?;
-    output::write_bytes(&output, page.as_bytes())?;
-    let text = || format!("{}: open it in a browser\n", output.display());
-    global.print_about(&output, &serde_json::json!({ "page": output }), text)
+    global.write_page(&output, &page)
 }

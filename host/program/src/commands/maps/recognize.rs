@@ -130,7 +130,7 @@ pub(in crate::commands) fn print_located<'m>(
     ))
 }
 
-pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
+pub(super) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let file = kinds::maps(&arguments.model, "recognize")?;
     let maps = file.maps();
     let own = maps.stopping();

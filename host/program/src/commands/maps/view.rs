@@ -26,9 +26,9 @@ pub(super) struct Arguments {
     probe: ProbeArguments,
 }
 
-pub(super) fn run(Arguments { touches, output: to, probe }: &Arguments, global: &Global) -> Result<()> {
-    output::admit(to, touches)?;
-    let file = shape::hand(probe)?;
+pub(super) fn run(Arguments { touches, output: to, probe }: Arguments, global: &Global) -> Result<()> {
+    output::admit(&to, &touches)?;
+    let file = shape::hand(&probe)?;
     let touched = touches.iter().map(|path| shape::read(path, &file)).collect::<Result<Vec<_>>>()?;
     let mut maps: Vec<page::Map> = Vec::new();
     let mut registered = false;
@@ -37,7 +37,7 @@ pub(super) fn run(Arguments { touches, output: to, probe }: &Arguments, global: 
         registered = aligned.is_some();
         maps.push(page::Map { name, shape: aligned.unwrap_or(shape), radius: file.probe.radius });
     }
-    output::write_bytes(to, page::page(&maps, registered).as_bytes())?;
+    output::write_bytes(&to, page::page(&maps, registered).as_bytes())?;
     let text = || format!("{}: open it in a browser\n", to.display());
-    global.print_about(to, &serde_json::json!({ "page": to, "registered": registered }), text)
+    global.print_about(&to, &serde_json::json!({ "page": to, "registered": registered }), text)
 }

@@ -60,8 +60,8 @@ pub(super) struct Arguments {
     strangers: StrangersArguments,
 }
 
-pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
-    let Arguments { model: path, rows, output: to, promise, strangers, .. } = arguments;
+pub(super) fn run(arguments: Arguments, global: &Global) -> Result<()> {
+    let Arguments { model: path, rows, output: to, promise, strangers, .. } = &arguments;
     let background = strangers.background();
     output::admit(to, [path, rows].into_iter().chain(background))?;
     let compiled = kinds::compiled(path, ModelKind::Rows, "calibrate")?;

@@ -60,11 +60,11 @@ pub(super) struct Arguments {
     page: Option<PathBuf>,
 }
 
-pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
+pub(super) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let file = kinds::file(&arguments.model, ModelKind::Rows, "evaluate")?;
     match &arguments.sequence_column {
-        Some(sequence) => on_sequences(arguments, sequence, &file, global),
-        None => on_rows(arguments, &file, global),
+        Some(sequence) => on_sequences(&arguments, sequence, &file, global),
+        None => on_rows(&arguments, &file, global),
     }
 }
 

@@ -6,36 +6,20 @@ mod recognize;
 
 pub(super) use recognize::{reset, verdict_name};
 
-use super::{Global, remark};
+use super::remark;
 use palpate::Result;
 use palpate::compile;
 use palpate::rows::{BY_POSITION, Features, Rows, SequenceColumns, Sequences};
 use palpate_onboard::Model;
 use std::path::Path;
 
-#[derive(clap::Args)]
-#[command(arg_required_else_help = true, subcommand_required = true)]
-pub(crate) struct Arguments {
-    #[command(subcommand)]
-    command: Command,
-}
-
-#[derive(clap::Subcommand)]
-enum Command {
+group! {
     /// Set thresholds that keep an error rate on sequences of rows
-    Calibrate(Box<calibrate::Arguments>),
+    Calibrate => calibrate,
     /// Measure how often a model is right on rows, or on sequences of rows
-    Evaluate(Box<evaluate::Arguments>),
+    Evaluate => evaluate,
     /// Give the class or the value of rows
-    Recognize(Box<recognize::Arguments>),
-}
-
-pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
-    match arguments.command {
-        Command::Calibrate(arguments) => calibrate::run(&arguments, global),
-        Command::Evaluate(arguments) => evaluate::run(&arguments, global),
-        Command::Recognize(arguments) => recognize::run(&arguments, global),
-    }
+    Recognize => recognize,
 }
 
 /// Reads rows of these features; says on stderr if columns are taken by their position.

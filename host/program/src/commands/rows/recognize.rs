@@ -104,14 +104,14 @@ pub(in crate::commands) fn reset(recognizer: &mut Recognizer<'_, 256>, weights: 
 }
 
 /// Prints the class or the value of each row, or the verdict so far.
-pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<()> {
+pub(super) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let compiled = kinds::compiled(&arguments.model, ModelKind::Rows, "recognize")?;
     let model = compiled.model();
     let stopping = stopping(&model, arguments.error_rate, arguments.max_rows)?;
     let recognizer = Recognizer::<256>::new(&model, stopping);
     let recognizer = recognizer.map_err(|error| too_many_objects(error).in_file(&arguments.model))?;
     let weights = arguments.expected.weights(&compiled.names(), &evaluate::own_weights(&model))?;
-    recognize(recognizer, weights.as_deref(), arguments, global.json)
+    recognize(recognizer, weights.as_deref(), &arguments, global.json)
 }
 
 fn recognize(
