@@ -4,6 +4,7 @@
 mod candidate;
 mod different;
 mod estimate;
+pub mod plain;
 pub mod predict;
 mod reference;
 mod score;
