@@ -26,8 +26,9 @@ pub fn add_noise(dataset: &mut Dataset, noise: &Noise, seed: u64) -> Result<usiz
 #[cfg(all(test, feature = "train"))]
 mod tests {
     use super::*;
+    use crate::compile;
     use crate::ensemble::train::{Settings, train};
-    use crate::evaluate::{Candidate, Margins};
+    use crate::evaluate::Margins;
     use crate::tests::synthetic;
     use crate::with;
     use std::collections::BTreeSet;
@@ -36,15 +37,17 @@ mod tests {
     fn every_group_is_of_one_robots_touches() {
         let mut dataset = synthetic::dataset(&[1_000, 760], 1);
         let ensemble = train(&dataset, &Settings { rounds: 2, ..Settings::compact() }, &()).unwrap();
+        let compiled = compile::exact(&ensemble).unwrap();
+        let model = compiled.model();
         let noise = with!(Noise::default(), speed_bias = 0.05);
         let robots = add_noise(&mut dataset, &noise, 1).unwrap();
         assert_eq!(robots, 3);
-        let margins = Margins::new(Candidate::Full(&ensemble), &dataset).unwrap();
+        let margins = Margins::new(&model, &dataset).unwrap();
         assert_eq!(margins.fewest_touches(), 253);
         for (position, touches) in [(0, 1_000), (1, 760)] {
             let mut seen = BTreeSet::new();
             for group in 0..30 {
-                let drawn: Vec<usize> = margins.draw(position, group, 100, 1).into_iter().collect();
+                let drawn: Vec<usize> = margins.draw(position, group, 100, 1).map(|touch| touch as usize).collect();
                 assert!(drawn.iter().all(|touch| touch % robots == group % robots && *touch < touches));
                 assert_eq!(drawn.iter().collect::<BTreeSet<_>>().len(), 100);
                 seen.insert(drawn[0] % robots);
@@ -58,6 +61,8 @@ mod tests {
     fn every_group_is_of_one_instances_touches_and_one_robots() {
         let mut dataset = synthetic::dataset(&[1_000, 760], 1);
         let ensemble = train(&dataset, &Settings { rounds: 2, ..Settings::compact() }, &()).unwrap();
+        let compiled = compile::exact(&ensemble).unwrap();
+        let model = compiled.model();
         let names = ["a", "b", "c", "d"].map(String::from);
         let object = &dataset.objects[1];
         dataset.objects[1] = ObjectTouches::in_turn(object.name.clone(), object.touches().to_vec(), &names, 0);
@@ -65,11 +70,11 @@ mod tests {
         for (robots, turns) in [(1, [1, 4]), (3, [3, 12]), (2, [2, 4])] {
             let mut of_robots = dataset.clone();
             of_robots.add_noise(&bias, 1, robots);
-            let margins = Margins::new(Candidate::Full(&ensemble), &of_robots).unwrap();
+            let margins = Margins::new(&model, &of_robots).unwrap();
             for (position, turns) in turns.into_iter().enumerate() {
                 for group in 0..30 {
-                    let drawn = margins.draw(position, group, 20, 1);
-                    assert!(drawn.iter().all(|touch| touch % turns == group % turns), "{robots} robots, {turns} turns");
+                    let mut drawn = margins.draw(position, group, 20, 1).map(|touch| touch as usize);
+                    assert!(drawn.all(|touch| touch % turns == group % turns), "{robots} robots, {turns} turns");
                 }
             }
         }

@@ -1,13 +1,13 @@
 //! A compiled model compared with its ensemble: margins touch by touch, verdicts sequence by sequence.
 
-use super::Candidate;
-use super::margins::{OfTouches, best, row};
+use super::margins::{OfTouches, row};
 use super::together::margins_of_touches;
 use super::unfit::{raw_features, too_many_objects};
 use crate::ensemble::{Ensemble, OverTouches};
 use crate::error::{Error, Result, problem};
+use crate::evidence::{Drawer, best};
 use crate::progress::{self, Progress};
-use crate::random::{self, Purpose};
+use crate::random::Purpose;
 use crate::touches::{Dataset, ObjectTouches, Pool};
 use palpate_onboard::{Model, Recognizer, Refused, Stopping, Verdict};
 use palpate_shared::Touch;
@@ -59,7 +59,7 @@ pub fn parity(
             problem!("there are no touches to compare the models on").fix("Give at least one touch of each object.")
         );
     }
-    let delivered = Candidate::Compiled(model).delivered(dataset);
+    let delivered = model.delivered(dataset);
     let dataset = delivered.as_ref();
     let touches: Vec<&Touch> = dataset.touches().collect();
     check(ensemble, model)?;
@@ -83,7 +83,7 @@ pub fn parity(
     progress.begin("verdicts", Some(sequences as u64));
     let runs = (0..sequences).into_par_iter().map(|index| -> Result<_> {
         progress::advance(progress, 1)?;
-        let mut rng = random::generator(seed, Purpose::Sequences, "", index as u64);
+        let mut rng = Drawer { purpose: Purpose::Sequences, name: "", seed }.random(index as u64);
         let object = rng.random_range(0..dataset.objects.len());
         let pool = &pools[object][index % pools[object].len()].touches;
         let draw = std::iter::repeat_with(|| {
