@@ -12,7 +12,7 @@ use crate::page::table::{Cell, Records, Table};
 use palpate::compile;
 use palpate::ensemble::train;
 use palpate::error::Result;
-use palpate::evaluate::{Candidate, Margins};
+use palpate::evaluate::Margins;
 use palpate::wording::{count, counted};
 use std::time::Instant;
 
@@ -71,8 +71,8 @@ fn one_fold(context: &Context, fold: usize) -> Result<Fold> {
     let settings = context.settings;
     let fewest = split.test.fewest_in_sequence();
     let most = MOST.min(largest_group(fewest));
-    let tested = |candidate, seconds| -> Result<MethodFold> {
-        let margins = Margins::new(candidate, &split.test)?;
+    let tested = |model, seconds| -> Result<MethodFold> {
+        let margins = Margins::new(model, &split.test)?;
         // Other folds draw other groups.
         let seed = settings.seed.wrapping_add(fold as u64);
         let few = margins.curve(most, settings.groups, seed)?;
@@ -86,8 +86,8 @@ fn one_fold(context: &Context, fold: usize) -> Result<Fold> {
             seconds,
         })
     };
-    let paper = tested(Candidate::Compiled(&paper), paper_seconds)?;
-    let ours = tested(Candidate::Compiled(&ours), ours_seconds)?;
+    let paper = tested(&paper, paper_seconds)?;
+    let ours = tested(&ours, ours_seconds)?;
     Ok(Fold { methods: vec![paper, ours] })
 }
 

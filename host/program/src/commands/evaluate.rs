@@ -8,8 +8,8 @@ use super::real::RealArguments;
 use super::sequences::{self, Evaluation, SequenceArguments};
 use super::table::{self, TableArguments};
 use palpate::calibrate::{Per, Terms};
-use palpate::ensemble::OverTouches;
-use palpate::evaluate::model_file::ModelFile;
+use palpate::compile::{self, CompiledModel};
+use palpate::ensemble::compiled_trained_on;
 use palpate::evaluate::over_touches;
 use palpate::evaluate::{self, Classes, Evaluated, Regression, RowsEvaluation, Wanted, evaluate_rows};
 use palpate::output;
@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 /// Measure how often a model is right, and after how many touches.
 #[derive(clap::Args)]
 #[command(after_help = "\
-Evaluate on touches that the model was not trained on. A compiled model is evaluated by the code that runs on the chip, an ensemble in f32. A compiled model stops by its own thresholds; if it was calibrated, the figures show whether it keeps its promise. Wrong names are shares of all sequences, and of those that got a name. docs/reference/options.md explains every figure.
+Evaluate on touches that the model was not trained on. Models are evaluated by the code that runs on the chip; an ensemble is compiled first, with its own leaves. A model stops by its own thresholds, an ensemble at a posterior of 99 %; if it was calibrated, the figures show whether it keeps its promise. Wrong names are shares of all sequences, and of those that got a name. docs/reference/options.md explains every figure.
 
 Examples:
   palpate capture builtin -o unseen --approaches 6000 --seed 2
@@ -90,12 +90,8 @@ impl Arguments {
 }
 
 /// True if the pattern of touching fingers is evidence to the model.
-fn counts_patterns(file: &ModelFile) -> bool {
-    let counted = match file {
-        ModelFile::Full(ensemble) => ensemble.trained_touches().counted,
-        ModelFile::Compiled(compiled) => compiled.model().trained_touches().counted,
-    };
-    counted != Counted::Full
+fn counts_patterns(compiled: &CompiledModel) -> bool {
+    compiled.model().trained_touches().counted != Counted::Full
 }
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
@@ -112,23 +108,23 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         return arguments.table.evaluate(&wanted, global);
     };
     arguments.table.check_unused()?;
-    let file = ModelFile::load(&arguments.model)?;
+    let compiled = compile::read_any(&arguments.model)?;
     if let Some(label) = &arguments.sequences_of_rows.label {
         return match arguments.sequences_of_rows.columns() {
-            Some(columns) => sequences_of(&arguments, directory, &file, columns, global),
+            Some(columns) => sequences_of(&arguments, directory, &compiled, columns, global),
             None if arguments.stops() => {
                 Err(Error::setting("label", label, "it with --sequence-column, or without options of sequences"))
             }
-            None => rows(directory, &arguments, &file, label, global),
+            None => rows(directory, &arguments, &compiled, label, global),
         };
     }
-    let mut dataset = super::checked(Dataset::read_any(directory)?).matching(&file.names());
+    let mut dataset = super::checked(Dataset::read_any(directory)?).matching(&compiled.names());
     super::refuse_located(&dataset, directory)?;
     let touches = || dataset.touches();
-    if counts_patterns(&file) {
+    if counts_patterns(&compiled) {
         super::warn_of_full(touches().count(), touches().any(|touch| !touch.is_full()));
     }
-    let trained_on: Vec<String> = file.trained_on(&dataset).into_iter().map(String::from).collect();
+    let trained_on: Vec<String> = compiled_trained_on(&compiled, &dataset).into_iter().map(String::from).collect();
     let probe = arguments.probe.read()?;
     arguments.probe.of_dataset(probe.as_ref(), &dataset)?;
     let noise = arguments.real.over(arguments.probe.noise(probe.as_ref(), &dataset, Noise::default())?)?;
@@ -154,7 +150,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         unknown: unknown.as_ref().map(|(directory, dataset)| (*directory, dataset)),
     };
     let expecting = |objects: &[String], own: &[f64]| arguments.expected.weights(objects, own);
-    let measured = file.with(|candidate| evaluate::measure(candidate, &dataset, &wanted, expecting))?;
+    let measured = evaluate::measure(&compiled.model(), &dataset, &wanted, expecting)?;
     let evaluated = Evaluated { robots, trained_on, ..measured };
     drop(progress);
     global.print(&evaluated, || text(&evaluated))
@@ -164,11 +160,10 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
 fn sequences_of(
     arguments: &Arguments,
     rows: &Path,
-    file: &ModelFile,
+    compiled: &CompiledModel,
     columns: SequenceColumns<'_>,
     global: &Global,
 ) -> Result<()> {
-    let ModelFile::Compiled(compiled) = file else { return Err(sequences::needs_compiled(&arguments.model)) };
     let model = compiled.model();
     let weights = arguments.expected.weights(&compiled.names(), &evaluate::own_weights(&model))?;
     let Arguments { error_rate, max_touches, .. } = *arguments;
@@ -183,16 +178,13 @@ fn sequences_of(
 }
 
 /// Evaluates a model on labeled rows.
-fn rows(directory: &Path, arguments: &Arguments, file: &ModelFile, label: &str, global: &Global) -> Result<()> {
-    if file.with(|candidate| Ok(!candidate.is_of_rows()))? {
+fn rows(directory: &Path, arguments: &Arguments, compiled: &CompiledModel, label: &str, global: &Global) -> Result<()> {
+    let model = compiled.model();
+    if model.descriptor().is_some() {
         return Err(over_touches().in_file(&arguments.model));
     }
-    let features = match file {
-        ModelFile::Full(ensemble) => Features::from(&**ensemble),
-        ModelFile::Compiled(compiled) => Features::from(&compiled.model()),
-    };
-    let rows = super::rows::read_rows(directory, features, Some(label))?;
-    let evaluated = file.with(|candidate| evaluate_rows(candidate, &rows)).map_err(|error| error.in_file(directory))?;
+    let rows = super::rows::read_rows(directory, Features::from(&model), Some(label))?;
+    let evaluated = evaluate_rows(&model, &rows).map_err(|error| error.in_file(directory))?;
     if global.json {
         return output::print_json(&evaluated);
     }

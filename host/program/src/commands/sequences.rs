@@ -4,7 +4,6 @@ use super::Global;
 use super::figures::shares_table;
 use palpate::Result;
 use palpate::compile::{self, CompiledModel};
-use palpate::error::{Error, Place, problem};
 use palpate::evaluate::Finding;
 use palpate::output;
 use palpate::rows::{Features, SequenceColumns, Sequences};
@@ -161,11 +160,4 @@ fn evaluated_text(evaluated: &Evaluated) -> String {
     let mut recognized = evaluated.names.clone();
     recognized.push("no name".into());
     text + &shares_table("Confusion matrix", &evaluated.names, &recognized, &evaluated.confusion)
-}
-
-/// Refuses sequences of an ensemble: only a compiled model stops.
-pub(crate) fn needs_compiled(path: &Path) -> Error {
-    problem!("an ensemble has no thresholds to stop at")
-        .fix("Compile it with `palpate export`, and give the model.")
-        .at(Place::file(path))
 }
