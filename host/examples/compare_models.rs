@@ -10,7 +10,7 @@ use palpate::capture::capture;
 use palpate::compile::{self, compile};
 use palpate::ensemble::train::{self, train};
 use palpate::evaluate::parity::parity;
-use palpate::evaluate::{Candidate, Margins, Settings, evaluate};
+use palpate::evaluate::{Margins, Settings, evaluate};
 use palpate::mesh::{Mesh, Object};
 use palpate::onboard::Model;
 use palpate::touches::{Dataset, Origin, folds};
@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let compiled = compile(&ensemble, &compile::Settings::default())?;
         let model = Model::new(&compiled.bytes)?;
 
-        let margins = Margins::new(Candidate::Compiled(&model), &split.test)?;
+        let margins = Margins::new(&model, &split.test)?;
         let evaluation = evaluate(&margins, &settings)?;
         let accuracy: String = evaluation.accuracy.values().map(|share| format!(" {:5.1}%", 100.0 * share)).collect();
         let sequential = &evaluation.sequential;

@@ -19,7 +19,7 @@ use palpate::capture;
 use palpate::compile::{self, Leaf};
 use palpate::ensemble::Ensemble;
 use palpate::ensemble::train::{self, train};
-use palpate::evaluate::{Candidate, Margins, SequentialSettings};
+use palpate::evaluate::{Margins, SequentialSettings};
 use palpate::mesh::builtin;
 use palpate::onboard::Model;
 use palpate::touches::{Dataset, ObjectTouches, Origin};
@@ -136,7 +136,7 @@ impl Way {
         };
         let compiled = compile::compile(ensemble, &self.compile)?;
         let model = Model::new(&compiled.bytes)?;
-        let margins = Margins::new(Candidate::Compiled(&model), test)?;
+        let margins = Margins::new(&model, test)?;
         let sequences = SEQUENCES / test.objects.len() + 1;
         let settings = SequentialSettings { error_rate: None, max_touches: None, sequences, seed: 1 };
         let at = [20, 60, 200].map(|at| at.min(margins.fewest_approaches()));

@@ -4,13 +4,14 @@ pub use palpate_trees::compile::*;
 
 #[cfg(feature = "train")]
 use crate::ensemble::train;
-use crate::ensemble::{Ensemble, OverTouches, TouchOrigin};
+use crate::ensemble::{self, Ensemble, OverTouches, TouchOrigin, import::Options};
 use crate::error::{Error, Result};
 use crate::touches::Longest;
 use crate::with;
 use palpate_onboard::Model;
-use palpate_shared::format::{Length, Tag};
+use palpate_shared::format::{Length, MAGIC, Tag};
 use palpate_trees::compile as trees;
+use std::path::Path;
 
 /// Models of more objects than this are usually compiled with leaves of one byte: `docs/measurements/growth.md`
 /// has what that saves and what it costs.
@@ -48,6 +49,28 @@ pub fn weights(weights: &[f64]) -> Result<Vec<u32>> {
 /// Errors of [`palpate_trees::compile::compile`], and if the ensemble states something of its touches that cannot be read.
 pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
     trees::compile(ensemble, &stated(ensemble, settings)?)
+}
+
+/// An ensemble with its own leaves, in f32: the model as which it is evaluated.
+///
+/// # Errors
+/// Errors of [`compile`].
+pub fn exact(ensemble: &Ensemble) -> Result<CompiledModel> {
+    Ok(CompiledModel::from_bytes(compile(ensemble, &with!(Settings::default(), leaf = Leaf::F32))?.bytes)?)
+}
+
+/// Reads a model, or an ensemble as its [`exact`] model; the first bytes of the file say which it is.
+///
+/// # Errors
+/// Errors of [`CompiledModel::read`] and [`ensemble::load`](ensemble::load()); an ensemble that does not compile.
+pub fn read_any(path: impl AsRef<Path>) -> Result<CompiledModel> {
+    let path = path.as_ref();
+    let bytes = std::fs::read(path).map_err(|source| Error::io(path, "read the model", source))?;
+    if bytes.starts_with(&MAGIC) {
+        return Ok(CompiledModel::from_file(path, bytes)?);
+    }
+    let model = exact(&ensemble::read(path, &bytes, &Options::default())?).map_err(|error| error.in_file(path))?;
+    Ok(CompiledModel::from_file(path, model.into_bytes())?)
 }
 
 /// Compiles an ensemble to at most `most` bytes, as [`compile`].

@@ -1,8 +1,9 @@
 //! The trainers compared: `cargo test --release -p palpate --features xgboost --test xgboost`.
 
+use palpate::compile;
 use palpate::ensemble::Ensemble;
 use palpate::ensemble::train::{Engine, Settings, train};
-use palpate::evaluate::{Candidate, Margins};
+use palpate::evaluate::Margins;
 use palpate::shared::Touch;
 use palpate::touches::{Dataset, ObjectTouches, Source};
 use palpate::with;
@@ -45,7 +46,9 @@ fn both_trainers_are_as_accurate_with_the_published_method() {
     for counts in [[6_000, 6_000, 6_000], [6_000, 2_000, 3_000]] {
         let [ours, theirs] =
             both(&synthetic::dataset(&counts, 10), &with!(Settings::paper(), rounds = 30)).map(|ensemble| {
-                let margins = Margins::new(Candidate::Full(&ensemble), &unseen).unwrap();
+                let compiled = compile::exact(&ensemble).unwrap();
+                let model = compiled.model();
+                let margins = Margins::new(&model, &unseen).unwrap();
                 margins.curve(10, 1_000, 1).unwrap().accuracy(10).value
             });
         eprintln!("{counts:?}: accuracy at 10 touches {ours:.3} with ours, {theirs:.3} with XGBoost");

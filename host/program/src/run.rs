@@ -10,7 +10,7 @@ use palpate::compile::{self, Compiled, CompiledModel};
 use palpate::ensemble::{StatedProbe, train};
 use palpate::error::{Kind, Result, problem};
 use palpate::evaluate::parity::{self, Parity};
-use palpate::evaluate::{self, Candidate, Curve, Evaluation, Margins, PromiseCheck};
+use palpate::evaluate::{self, Curve, Evaluation, Margins, PromiseCheck};
 use palpate::mesh::Object;
 use palpate::output;
 use palpate::probe::noise::Noise;
@@ -364,7 +364,7 @@ impl Trial {
         ensemble.save(out.join(stem).with_extension("json"))?;
         output::write_bytes(&model_path(out, stem), &compiled.bytes)?;
         let model = compile::open(&compiled.bytes)?;
-        let margins = Margins::new(Candidate::Compiled(&model), &split.test)?;
+        let margins = Margins::new(&model, &split.test)?;
         let fewest = margins.fewest_touches();
         let seed = settings.capture.origin.seed;
         let mut evaluation = evaluate::evaluate(
@@ -380,7 +380,7 @@ impl Trial {
                 noise = settings.noise
             ),
         )?;
-        let approached = Margins::new(Candidate::Compiled(&model), approaches)?;
+        let approached = Margins::new(&model, approaches)?;
         let fewest_approaches = approached.fewest_approaches();
         let by_approach = evaluate::evaluate(
             &approached,

@@ -9,9 +9,7 @@ use crate::named::noise_of;
 use crate::work::{Callback, long};
 use palpate::compile;
 use palpate::ensemble::StatedProbe;
-use palpate::evaluate::{
-    self as library, Candidate, LEAST_GROUPS, Margins, Settings, add_noise, parity::parity as compare,
-};
+use palpate::evaluate::{self as library, LEAST_GROUPS, Margins, Settings, add_noise, parity::parity as compare};
 use palpate::with;
 use pyo3::prelude::*;
 
@@ -41,21 +39,23 @@ pub(crate) fn evaluate(
     seed: u64,
 ) -> Result<String, Failure> {
     let noise = noise_of(noise, timer)?;
-    let candidate = match &model {
-        Evaluated::Model(model) => Candidate::Compiled(model.get().model()),
-        Evaluated::Ensemble(ensemble) => Candidate::Full(&ensemble.get().ensemble),
+    let (compiled, exact);
+    let model = match &model {
+        Evaluated::Model(model) => model.get().model(),
+        Evaluated::Ensemble(ensemble) => {
+            compiled = compile::exact(&ensemble.get().ensemble)?;
+            exact = compiled.model();
+            &exact
+        }
     };
     let data = &data.get().dataset;
-    let names = match &model {
-        Evaluated::Model(model) => compile::names(model.get().model()),
-        Evaluated::Ensemble(ensemble) => ensemble.get().ensemble.objects.clone(),
-    };
+    let names = compile::names(model);
     let evaluation = long(py, None, |_| {
         let mut dataset = (**data).clone().matching(&names);
         // What the touches have already counts too.
         let stated = dataset.real().and(&noise);
         add_noise(&mut dataset, &noise, seed)?;
-        let margins = Margins::new(candidate, &dataset)?;
+        let margins = Margins::new(model, &dataset)?;
         let (usual, enough) = (Settings::default(), |count: u64| count >= LEAST_GROUPS);
         let at_approaches = at.clone().unwrap_or(usual.at_approaches);
         let at = at.unwrap_or_else(|| usual.at.into_iter().filter(|&at| enough(margins.distinct_groups(at))).collect());

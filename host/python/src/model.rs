@@ -10,7 +10,6 @@ use numpy::ndarray::Ix2;
 use palpate::compile::{self as library, Compiled, CompiledModel, Language, Leaf, Settings};
 use palpate::ensemble::Probability;
 use palpate::error::{Error, problem};
-use palpate::evaluate::Candidate;
 use palpate::evaluate::predict::{Predicted, predict};
 use palpate::evaluate::together::{AT_ONCE, Together, TouchesTogether};
 use palpate::evaluate::{over_touches, raw_features};
@@ -136,7 +135,7 @@ impl Model {
         raw: bool,
     ) -> palpate::Result<Predicted> {
         let values = taken(&self.features, rows)?;
-        py.detach(|| predict(Candidate::Compiled(self.model()), &values, self.features.count(), raw))
+        py.detach(|| predict(self.model(), &values, self.features.count(), raw))
     }
 
     /// The margins of all rows.

@@ -187,7 +187,8 @@ pub(super) fn compiled_f32(ensemble: &Ensemble) -> Result<compile::Compiled> {
 mod tests {
     use super::*;
     use crate::small::meshes;
-    use palpate::evaluate::{Candidate, Margins};
+    use palpate::compile;
+    use palpate::evaluate::Margins;
 
     #[test]
     fn what_a_fold_states_of_objects_with_several_meshes_is_what_fresh_touches_give() {
@@ -198,8 +199,10 @@ mod tests {
         assert_eq!(test.several().into_values().collect::<Vec<_>>(), [2; 3]);
         let ensemble = context.train(&train, &context.ours()).unwrap();
         let fresh = context.touch(3_000, 9).unwrap().into_iter().map(|(object, _)| object).collect();
+        let compiled = compile::exact(&ensemble).unwrap();
+        let model = compiled.model();
         let accuracy = |dataset: &Dataset| {
-            let margins = Margins::new(Candidate::Full(&ensemble), dataset).unwrap();
+            let margins = Margins::new(&model, dataset).unwrap();
             margins.curve(10, 500, 1).unwrap().accuracy(10).value
         };
         let (stated, measured) = (accuracy(&test), accuracy(&Dataset::new(fresh)));

@@ -10,7 +10,7 @@ use crate::page::document::{Figure, Section};
 use palpate::compile::{self, Leaf};
 use palpate::ensemble::{Ensemble, OverTouches};
 use palpate::error::Result;
-use palpate::evaluate::{Candidate, Margins, parity};
+use palpate::evaluate::{Margins, parity};
 use palpate::results::{Results, Value};
 use palpate::wording::count;
 use palpate::{row, with};
@@ -109,7 +109,7 @@ fn member(
         }
     };
     let model = compile::open(&compiled.bytes)?;
-    let margins = Margins::new(Candidate::Compiled(&model), &large.test)?;
+    let margins = Margins::new(&model, &large.test)?;
     let groups = settings.cost_groups;
     let all: Vec<&Touch> = touches.iter().collect();
     let curve = margins.curve(100.min(margins.fewest_touches()), groups, settings.seed)?;

@@ -11,7 +11,7 @@ use crate::page::document::{Figure, Section};
 use palpate::compile;
 use palpate::ensemble::train;
 use palpate::error::Result;
-use palpate::evaluate::{Candidate, Margins};
+use palpate::evaluate::Margins;
 use palpate::results::{Results, Value};
 use palpate::row;
 use palpate::wording::{count, counted};
@@ -72,8 +72,8 @@ fn one_fold(context: &Context, fold: usize) -> Result<Fold> {
     let settings = context.settings;
     let fewest = split.test.fewest_in_sequence();
     let most = MOST.min(largest_group(fewest));
-    let tested = |candidate, seconds| -> Result<MethodFold> {
-        let margins = Margins::new(candidate, &split.test)?;
+    let tested = |model, seconds| -> Result<MethodFold> {
+        let margins = Margins::new(model, &split.test)?;
         // Other folds draw other groups.
         let seed = settings.seed.wrapping_add(fold as u64);
         let few = margins.curve(most, settings.groups, seed)?;
@@ -87,8 +87,8 @@ fn one_fold(context: &Context, fold: usize) -> Result<Fold> {
             seconds,
         })
     };
-    let paper = tested(Candidate::Compiled(&paper), paper_seconds)?;
-    let ours = tested(Candidate::Compiled(&ours), ours_seconds)?;
+    let paper = tested(&paper, paper_seconds)?;
+    let ours = tested(&ours, ours_seconds)?;
     Ok(Fold { methods: vec![paper, ours] })
 }
 

@@ -11,7 +11,8 @@ use crate::page::document::{Figure, Section};
 use palpate::compile;
 use palpate::ensemble::Ensemble;
 use palpate::error::Result;
-use palpate::evaluate::{Candidate, Margins};
+use palpate::evaluate::Margins;
+use palpate::onboard::Model;
 use palpate::results::{Results, Value};
 use palpate::touches::Dataset;
 use palpate::wording::{count, decimal};
@@ -105,8 +106,8 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Limit> {
     let [paper, ours] = [compile::open(&bytes[0])?, compile::open(&bytes[1])?];
 
     let groups = settings.limit_groups;
-    let measured = |name: &str, candidate: Candidate| -> Result<Measured> {
-        let margins = Margins::new(candidate, &large.test)?;
+    let measured = |name: &str, model: &Model<'_>| -> Result<Measured> {
+        let margins = Margins::new(model, &large.test)?;
         let curve = margins.curve(MOST, groups, settings.seed)?;
         let right = margins.confidences(10, groups, settings.seed)?;
         Ok(Measured {
@@ -115,14 +116,14 @@ pub(super) fn measure(context: &Context, large: &Large) -> Result<Limit> {
             right_at_10: right.into_iter().map(|confidence| confidence.correct).collect(),
         })
     };
-    let full = |name: &str, ensemble: &Ensemble| measured(name, Candidate::Full(ensemble));
+    let exact = |name: &str, ensemble: &Ensemble| measured(name, &compile::exact(ensemble)?.model());
     let candidates = vec![
-        measured("paper's method", Candidate::Compiled(&paper))?,
-        measured("ours", Candidate::Compiled(&ours))?,
-        full("large ensemble", &ensemble)?,
-        full("density estimate", &density)?,
-        full("large ensemble, half the capture", &ensemble_half)?,
-        full("density estimate, half the capture", &density_half)?,
+        measured("paper's method", &paper)?,
+        measured("ours", &ours)?,
+        exact("large ensemble", &ensemble)?,
+        exact("density estimate", &density)?,
+        exact("large ensemble, half the capture", &ensemble_half)?,
+        exact("density estimate, half the capture", &density_half)?,
     ];
     let at_10 = |index: usize| candidates[index].curve[9];
     let better = |a: usize, b: usize| if at_10(b) > at_10(a) { b } else { a };

@@ -10,7 +10,7 @@ use crate::page::document::{Figure, Section};
 use palpate::compile;
 use palpate::ensemble::train;
 use palpate::error::Result;
-use palpate::evaluate::{Candidate, Margins, add_noise};
+use palpate::evaluate::{Margins, add_noise};
 use palpate::probe::noise::{self, Noise};
 use palpate::results::{Results, Value};
 use palpate::touches::folds::Split;
@@ -75,7 +75,6 @@ fn tested(context: &Context, fold: usize, split: &Split, models: &Models) -> Res
     let settings = context.settings;
     let compiled = [compiled_f32(&models.paper)?.bytes, compiled(&models.ours)?.bytes, compiled(&models.noise)?.bytes];
     let models = [compile::open(&compiled[0])?, compile::open(&compiled[1])?, compile::open(&compiled[2])?];
-    let candidates = models.each_ref().map(Candidate::Compiled);
     let mut result = Fold {
         accuracy: vec![Vec::new(); METHODS.len()],
         confusion: vec![Vec::new(); METHODS.len()],
@@ -86,8 +85,8 @@ fn tested(context: &Context, fold: usize, split: &Split, models: &Models) -> Res
     for deviation in settings.deviations() {
         context.check()?;
         let test = noisy(&split.test, deviation, seed);
-        for (method, candidate) in candidates.into_iter().enumerate() {
-            let margins = Margins::new(candidate, &test)?;
+        for (method, model) in models.iter().enumerate() {
+            let margins = Margins::new(model, &test)?;
             let confusion = margins.confusion(10, settings.many_groups, seed)?;
             let right = |(object, row): (usize, &Vec<usize>)| row[object] as f64 / settings.many_groups as f64;
             result.accuracy[method].push(confusion.iter().enumerate().map(right).collect());
@@ -100,16 +99,16 @@ fn tested(context: &Context, fold: usize, split: &Split, models: &Models) -> Res
         context.check()?;
         let mut test = split.test.clone();
         add_noise(&mut test, &kind, seed)?;
-        for (method, candidate) in candidates.into_iter().enumerate() {
-            let margins = Margins::new(candidate, &test)?;
+        for (method, model) in models.iter().enumerate() {
+            let margins = Margins::new(model, &test)?;
             result.kinds[method].push(margins.curve(10, settings.many_groups, seed)?.accuracy(10).value);
         }
     }
     // The quick levels leave 5 ms out.
     if result.confusion[0].is_empty() {
         let test = noisy(&split.test, NOISE / 1e3, seed);
-        for (method, candidate) in candidates.into_iter().enumerate() {
-            result.confusion[method] = Margins::new(candidate, &test)?.confusion(10, settings.many_groups, seed)?;
+        for (method, model) in models.iter().enumerate() {
+            result.confusion[method] = Margins::new(model, &test)?.confusion(10, settings.many_groups, seed)?;
         }
     }
     Ok(result)

@@ -3,17 +3,15 @@
 use super::ahead::{Ahead, Feed};
 use super::demand::Demand;
 use crate::error::{Error, Result};
-use crate::evaluate::no_pose_of;
+use crate::evaluate::by_pose;
 use crate::evidence::Sequence;
-use crate::evidence::{self, Follower, Limit, Sequences, Supplier, chip};
+use crate::evidence::{self, Drawer, Follower, Limit, Sequences, Supplier, Turns, chip};
 use crate::in_order::in_order;
 use crate::progress::{self, Progress};
-use crate::random::{self, Purpose};
+use crate::random::Purpose;
 use crate::touches::ObjectTouches;
 use palpate_onboard::{Model, Stopping};
-use palpate_shared::Touch;
 use palpate_shared::format::Plan;
-use rand::seq::SliceRandom;
 use rayon::prelude::*;
 
 /// The touches of one object that no sequence has used yet.
@@ -23,8 +21,7 @@ pub struct TouchSupply<'d> {
     feed: Feed<'d>,
     /// One for each source and robot: a sequence is of touches of one pool.
     pools: Vec<Pool>,
-    /// The pool of the next sequence.
-    next: usize,
+    turns: Turns,
     /// True if a pool makes one sequence only.
     is_once: bool,
     /// The poses that the model's plan may propose; none where touches are taken in their order.
@@ -35,7 +32,6 @@ pub struct TouchSupply<'d> {
 #[derive(Debug, Default)]
 struct Pool {
     order: Vec<u32>,
-    used: usize,
     /// Under a plan the same by pose, each pose's last touch the next one.
     by_pose: Vec<Vec<u32>>,
 }
@@ -48,7 +44,7 @@ impl<'d> TouchSupply<'d> {
         let pools = touched.pools().iter().map(|pool| pool.range.clone().map(|touch| touch as u32).collect()).collect();
         let supply = Self::of(object, Feed::Given(touched.touches()), pools);
         let is_once = touched.has_robots();
-        if is_once { Self { is_once, ..supply } } else { supply.shuffled(&touched.name, seed) }
+        if is_once { Self { is_once, ..supply }.begun() } else { supply.shuffled(&touched.name, seed) }
     }
 
     /// Touches as if they were all captured before.
@@ -58,13 +54,17 @@ impl<'d> TouchSupply<'d> {
 
     fn of(object: usize, feed: Feed<'d>, pools: Vec<Vec<u32>>) -> Self {
         let pools = pools.into_iter().map(|order| Pool { order, ..Pool::default() }).collect();
-        Self { object, feed, pools, next: 0, is_once: false, candidates: Vec::new() }
+        Self { object, feed, pools, turns: Turns::default(), is_once: false, candidates: Vec::new() }.begun()
+    }
+
+    /// The supply with all touches of its pools ahead.
+    fn begun(self) -> Self {
+        Self { turns: Turns::new(self.pools.len(), self.is_once), ..self }
     }
 
     fn shuffled(mut self, name: &str, seed: u64) -> Self {
-        for (turn, pool) in (0..).zip(&mut self.pools) {
-            pool.order.shuffle(&mut random::generator(seed, Purpose::Calibration, name, turn));
-        }
+        let drawer = Drawer { purpose: Purpose::Calibration, name, seed };
+        (0..).zip(&mut self.pools).for_each(|(turn, pool)| drawer.shuffle(turn, &mut pool.order));
         self
     }
 
@@ -80,7 +80,8 @@ impl<'d> TouchSupply<'d> {
             };
             self.pools.iter_mut().map(take).collect()
         };
-        Self { pools, candidates: Vec::new(), ..*self }
+        self.turns = Turns::new(self.pools.len(), self.is_once);
+        Self { pools, turns: Turns::default(), candidates: Vec::new(), ..*self }.begun()
     }
 }
 
@@ -88,21 +89,20 @@ impl<'d> TouchSupply<'d> {
 pub(super) struct MarginSupply<'s, 'd, 'm> {
     supply: &'s mut TouchSupply<'d>,
     ahead: Ahead<'m>,
-    /// Position of the next touch in its pool's order.
-    next: usize,
     progress: &'s dyn Progress,
 }
 
 impl<'s, 'd, 'm> MarginSupply<'s, 'd, 'm> {
     pub(super) fn new(model: &'m Model<'m>, supply: &'s mut TouchSupply<'d>, progress: &'s dyn Progress) -> Self {
         let ahead = Ahead::new(model, supply.pools.len(), supply.is_once);
-        Self { supply, ahead, next: 0, progress }
+        Self { supply, ahead, progress }
     }
 
     /// The position among the object's touches of the last one that was supplied in its pool's order.
     #[cfg(all(test, feature = "train"))]
     pub(super) fn last(&self) -> u32 {
-        self.supply.pools[self.supply.next].order[self.next - 1]
+        let (pool, next) = self.supply.turns.place();
+        self.supply.pools[pool].order[next - 1]
     }
 }
 
@@ -110,38 +110,28 @@ impl<F: Follower<Step = [i32]> + ?Sized> Supplier<F> for MarginSupply<'_, '_, '_
     type Error = Error;
 
     fn step(&mut self, follower: &F) -> Result<Option<Option<&[i32]>>> {
-        let TouchSupply { feed, pools, next, candidates, .. } = &mut *self.supply;
-        let Some(pool) = pools.get_mut(*next) else { return Ok(None) };
+        let TouchSupply { feed, pools, turns, candidates, .. } = &mut *self.supply;
+        let (number, next) = turns.place();
+        let Some(pool) = pools.get_mut(number) else { return Ok(None) };
         if !pool.by_pose.is_empty() {
             // The next touch in the pose that the follower proposes.
             let pose = follower.propose(&mut candidates.iter().copied());
             let position = pose.and_then(|pose| pool.by_pose.get_mut(usize::from(pose))?.pop());
             return Ok(position.and_then(|position| feed.given(position)).map(|touch| self.ahead.one(touch)));
         }
-        let margins = self.ahead.next(*next, self.next, &pool.order, feed)?;
-        self.next += usize::from(margins.is_some());
-        Ok(margins)
+        turns.advance();
+        self.ahead.next(number, next, &pool.order, feed)
     }
 }
 
 impl<F: Follower<Step = [i32]> + ?Sized> Sequences<F> for MarginSupply<'_, '_, '_> {
     fn begin(&mut self) -> Result<Option<Sequence>> {
         progress::advance(self.progress, 1)?;
-        let Some(pool) = self.supply.pools.get(self.supply.next) else { return Ok(None) };
-        self.next = pool.used;
-        Ok(Some(Sequence::new(self.supply.object)))
+        Ok(self.supply.turns.begin().then(|| Sequence::new(self.supply.object)))
     }
 
-    /// A sequence that the touches end in is left out; one that a robot's touches end in ends there.
     fn end(&mut self, steps: u32, is_whole: bool) -> bool {
-        let TouchSupply { pools, next, is_once, .. } = &mut *self.supply;
-        let count = pools.len();
-        let Some(pool) = pools.get_mut(*next).filter(|pool| is_whole || (*is_once && !pool.order.is_empty())) else {
-            return false;
-        };
-        pool.used += steps as usize;
-        *next = if *is_once { *next + 1 } else { (*next + 1) % count };
-        true
+        self.supply.turns.end(steps, is_whole)
     }
 }
 
@@ -155,13 +145,9 @@ pub(super) fn follow_plan(supplies: &mut [TouchSupply<'_>], names: &[String], pl
     let poses = plan.poses();
     for supply in &mut *supplies {
         for pool in &mut supply.pools {
-            let mut by_pose = vec![Vec::new(); poses.count().into()];
-            for &touch in pool.order.iter().rev() {
-                let no_pose = || no_pose_of(names.get(supply.object).map_or("", String::as_str));
-                let pose = supply.feed.given(touch).and_then(Touch::pose).ok_or_else(no_pose)?;
-                by_pose[usize::from(poses.number_of(&pose))].push(touch);
-            }
-            pool.by_pose = by_pose;
+            let name = names.get(supply.object).map_or("", String::as_str);
+            let touches = pool.order.iter().rev().filter_map(|&touch| Some((touch, supply.feed.given(touch)?)));
+            pool.by_pose = by_pose(name, touches, poses)?;
         }
     }
     let pools = || supplies.iter().flat_map(|supply| &supply.pools);

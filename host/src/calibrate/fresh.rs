@@ -8,7 +8,7 @@ use super::model::{Drawn, Material, Settings, calibrate, calibrate_drawn, noise_
 use super::temperature::temperature_on_demand;
 use crate::capture::{self, Sampler};
 use crate::error::Result;
-use crate::evaluate::{Candidate, OfTouches};
+use crate::evaluate::OfTouches;
 use crate::mesh::Object;
 use crate::probe::scene::Scene;
 use crate::progress::Progress;
@@ -163,7 +163,7 @@ struct Lengths {
 /// Mean number of samples of each object in a sequence.
 fn means(model: &Model<'_>, dataset: &Dataset, settings: &Settings) -> Result<Vec<Lengths>> {
     let max_touches = settings.limit(model);
-    let (_, known) = Candidate::Compiled(model).of(dataset)?;
+    let (_, known) = model.of(dataset)?;
     let trained = model.trained_touches();
     let mean = |(touched, &object): (&ObjectTouches, &usize)| -> Result<Lengths> {
         let touches = touched.touches();

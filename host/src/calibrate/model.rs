@@ -13,7 +13,7 @@ use super::{Limit, Per};
 use crate::compile;
 use crate::ensemble::StatedProbe;
 use crate::error::{Error, Kind, Result, problem};
-use crate::evaluate::{Candidate, OfTouches, check_approaches, no_plan};
+use crate::evaluate::{OfTouches, check_approaches, no_plan};
 use crate::evidence::{Odds, Sequence, odds_of, totals};
 use crate::probe::noise::Noise;
 use crate::progress::Progress;
@@ -105,7 +105,7 @@ pub(crate) fn calibrate_from(
     progress: &dyn Progress,
 ) -> Result<Calibrated> {
     let material = Material::stated(model, &dataset, settings)?;
-    if let Cow::Owned(delivered) = Candidate::Compiled(model).delivered(&dataset) {
+    if let Cow::Owned(delivered) = model.delivered(&dataset) {
         dataset = delivered;
     }
     add_noise(model, &mut dataset, &settings.noise, material.max_touches, noise_seed(settings));
@@ -320,8 +320,7 @@ pub(super) fn calibrate_drawn(
 /// The names that a model gives, and the objects of a data set, which has all of them, by their indices in the model: of an
 /// object that may be of several outputs the first.
 pub(super) fn named(model: &Model<'_>, dataset: &Dataset) -> Result<(Vec<String>, Vec<usize>)> {
-    let candidate = Candidate::Compiled(model);
-    let (_, known) = candidate.of(dataset)?;
+    let (_, known) = model.of(dataset)?;
     let mut names = compile::names(model);
     // A background is not touched, and never named.
     names.truncate(model.known_count());
@@ -329,8 +328,7 @@ pub(super) fn named(model: &Model<'_>, dataset: &Dataset) -> Result<(Vec<String>
         let one = problem!("the model knows only one object: there is nothing to mistake it for");
         return Err(one.fix("Give a model of two or more objects."));
     }
-    let there: BTreeSet<usize> =
-        dataset.objects.iter().flat_map(|touched| candidate.outputs_of(&touched.name)).collect();
+    let there: BTreeSet<usize> = dataset.objects.iter().flat_map(|touched| model.outputs_of(&touched.name)).collect();
     let missing: Vec<String> =
         (0..names.len()).filter(|output| !there.contains(output)).map(|output| names[output].clone()).collect();
     let objects = missing.join(", ");
@@ -353,8 +351,7 @@ pub(super) fn named(model: &Model<'_>, dataset: &Dataset) -> Result<(Vec<String>
 
 /// The outputs of each of these objects, which are in the order of [`named`].
 fn outputs(model: &Model<'_>, dataset: &Dataset) -> Vec<Vec<usize>> {
-    let candidate = Candidate::Compiled(model);
-    dataset.objects.iter().map(|touched| candidate.outputs_of(&touched.name)).collect()
+    dataset.objects.iter().map(|touched| model.outputs_of(&touched.name)).collect()
 }
 
 impl Settings {

@@ -22,7 +22,7 @@ use super::temperature::temperature;
 use super::terms::Terms;
 use super::walk::{Kept, Stop, Tally, allowed, binomial_tail, needed, walk};
 use crate::error::{Error, Result};
-use crate::evaluate::{Candidate, OfTouches};
+use crate::evaluate::OfTouches;
 use crate::evidence::{Odds, Sequence, margin_of};
 use crate::probe::noise::Noise;
 use crate::progress::{self, Progress};
@@ -54,7 +54,7 @@ pub fn calibrate_recorded(
     let of_simulated = Material::new(model, &simulated, settings)?;
     let material = Material::stated(model, recorded, settings)?;
     let names = &material.names;
-    let delivered = Candidate::Compiled(model).delivered(recorded);
+    let delivered = model.delivered(recorded);
     let recorded = delivered.as_ref();
     add_noise(model, &mut simulated, &settings.noise, material.max_touches, noise_seed(settings));
     let terms = settings.terms();

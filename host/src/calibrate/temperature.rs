@@ -2,8 +2,8 @@
 
 use super::demand::Demand;
 use crate::error::Result;
+use crate::evaluate::OfTouches;
 use crate::evaluate::together::margins_of_touches;
-use crate::evaluate::{Candidate, OfTouches};
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::Model;
 use palpate_shared::Touch;
@@ -22,9 +22,8 @@ pub fn temperature(model: &Model<'_>, dataset: &Dataset, known: &[usize]) -> f64
     let evidence = |touched: &ObjectTouches| -> Vec<Touch> {
         touched.in_turns().filter(|touch| model.accepts(touch).is_ok()).take(MOST).copied().collect()
     };
-    let candidate = Candidate::Compiled(model);
     let outputs = |(touched, &known): (&ObjectTouches, &usize)| {
-        let outputs = candidate.outputs_of(&touched.name);
+        let outputs = model.outputs_of(&touched.name);
         if outputs.len() > 1 { outputs } else { vec![known] }
     };
     let outputs: Vec<Vec<usize>> = dataset.objects.iter().zip(known).map(outputs).collect();

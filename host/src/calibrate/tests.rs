@@ -1,6 +1,6 @@
 use super::*;
 use crate::compile;
-use crate::evaluate::{Candidate, Margins, SequentialSettings};
+use crate::evaluate::{Margins, SequentialSettings};
 use crate::evidence::{Chip, Sequences, Supplier, chip, sequences};
 use crate::probe::noise::Noise;
 use crate::random::{Purpose, generator};
@@ -215,7 +215,7 @@ fn with_other_priors_or_fewer_objects_errors_stay_below_what_theory_says() {
     let settings = SequentialSettings { error_rate: None, max_touches: None, sequences: 2_000, seed: 1 };
     let mut errors = Vec::new();
     for weights in [[1, 1, 1], [8, 1, 1], [1, 1, 8], [1, 1, 0], [0, 1, 1], [1, 0, 9]] {
-        let margins = Margins::new(Candidate::Compiled(&model), &unseen).unwrap().expecting(weights.to_vec()).unwrap();
+        let margins = Margins::new(&model, &unseen).unwrap().expecting(weights.to_vec()).unwrap();
         let sequential = margins.sequential(&settings).unwrap();
         assert!(sequential.error <= bound + 2.0 * sequential.error_standard_error, "{weights:?}: {}", sequential.error);
         assert_eq!(sequential.promised, None);
@@ -224,7 +224,7 @@ fn with_other_priors_or_fewer_objects_errors_stay_below_what_theory_says() {
         errors.push(sequential.error);
     }
     // Equal weights are what the model was calibrated for.
-    let equal = Margins::new(Candidate::Compiled(&model), &unseen).unwrap().sequential(&settings).unwrap();
+    let equal = Margins::new(&model, &unseen).unwrap().sequential(&settings).unwrap();
     assert!((equal.error - errors[0]).abs() < 1e-12);
 }
 

@@ -1,12 +1,11 @@
 //! Counted in approaches, which is what a robot pays for.
 
 use super::Estimate;
-use super::draws::Draws;
+use super::curve::See;
 use super::margins::Margins;
 use super::sequential::{Sequential, SequentialSettings};
 use crate::error::{Error, Result};
-use crate::random::Purpose;
-use rayon::prelude::*;
+use crate::evidence::follow;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -55,12 +54,18 @@ impl Margins<'_> {
             let allowed = format!("fewer approaches, or capture more: {name} has only {has}{}", self.of_what(name));
             return Err(Error::setting("at", most, allowed));
         }
-        let positions = 0..self.tested.len();
-        let correct: Vec<Vec<Estimate>> =
-            positions.map(|position| self.after(position, at, most, groups, seed)).collect();
+        let correct = |position| {
+            let run = |group, see: &mut See<'_>| {
+                let drawn = self.draw_approaches(position, group, seed).take(most);
+                let Ok(_) =
+                    follow(&mut self.steps(position, drawn), &mut self.sums(), |sums, counted| see(sums, counted));
+            };
+            let recognized = self.recognized(position, groups, [0, most], run).approaches;
+            at.iter().map(|&at| Estimate::share(recognized[at], groups)).collect()
+        };
+        let correct: Vec<Vec<Estimate>> = (0..self.tested.len()).map(correct).collect();
         let outcomes = self.each(groups, |position, sequence| {
-            let draws = self.draws(self.most_approaches_of(position, sequence), position, sequence, seed);
-            self.outcome(position, stopping, draws.map(|draw| self.approach(position, sequence, draw)))
+            self.outcome(position, stopping, self.draw_approaches(position, sequence, seed))
         });
         let used = self.tested.iter().map(|tested| tested.touches as f64 / tested.approaches.len().max(1) as f64);
         let sequential = self.of_outcomes(outcomes, self.stated(settings, stopping), stopping.max_touches(), true);
@@ -91,34 +96,5 @@ impl Margins<'_> {
             standard_error: by_number(&|index| accuracy(index).standard_error),
             per_object: names.zip(correct).map(|(name, of)| (name, by_number(&|index| of[index].value))).collect(),
         }
-    }
-
-    /// The numbers of approaches in the order in which a group has them.
-    pub(super) fn draws(&self, all: usize, position: usize, group: usize, seed: u64) -> Draws {
-        let group = u64::try_from(group).unwrap_or(u64::MAX);
-        Draws::new(all, Purpose::Approaches, &self.tested_names[position], group, seed)
-    }
-
-    /// The share of groups that are recognized after each of `at` approaches.
-    fn after(&self, position: usize, at: &[usize], most: usize, groups: usize, seed: u64) -> Vec<Estimate> {
-        let tested = &self.tested[position];
-        let group = |mut correct: Vec<usize>, group| {
-            let (mut evidence, mut is_evidence) = (self.prior(), false);
-            let draws = self.draws(self.most_approaches_of(position, group), position, group, seed);
-            for (index, draw) in draws.take(most).enumerate() {
-                if let Some(touch) = self.approach(position, group, draw) {
-                    tested.add(touch as usize, &mut evidence);
-                    is_evidence = true;
-                }
-                for (count, _) in correct.iter_mut().zip(at).filter(|(_, at)| **at == index + 1) {
-                    *count += usize::from(is_evidence && self.best(position, &evidence) == tested.object);
-                }
-            }
-            correct
-        };
-        let none = || vec![0; at.len()];
-        let add = |a: Vec<usize>, b: Vec<usize>| a.iter().zip(b).map(|(a, b)| a + b).collect();
-        let correct: Vec<usize> = (0..groups).into_par_iter().fold(none, group).reduce(none, add);
-        correct.into_iter().map(|correct| Estimate::share(correct, groups)).collect()
     }
 }

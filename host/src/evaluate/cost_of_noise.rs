@@ -1,6 +1,7 @@
 //! Cost of noise to a model that was trained without it.
 
-use super::{Candidate, Margins, add_noise};
+use super::{Margins, add_noise};
+use crate::compile;
 use crate::ensemble::train::{self, train};
 use crate::error::Result;
 use crate::probe::noise::Noise;
@@ -44,8 +45,10 @@ pub fn cost_of_noise(dataset: &Dataset, settings: &train::Settings, noise: &Nois
         .map(|(part, most)| part.each(|object| object.part(0..most, object.len().max(most))));
     let clean = train::Settings { noise: Noise::default(), rounds: settings.rounds.min(ROUNDS), ..settings.clone() };
     let ensemble = train(&train_part, &clean, &())?;
+    let compiled = compile::exact(&ensemble)?;
+    let model = compiled.model();
     let accuracy = |test: &Dataset| -> Result<f64> {
-        let margins = Margins::new(Candidate::Full(&ensemble), test)?;
+        let margins = Margins::new(&model, test)?;
         Ok(margins.curve(AT, GROUPS, settings.seed)?.accuracy(AT).value)
     };
     let clean = accuracy(&test)?;

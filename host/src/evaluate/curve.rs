@@ -1,9 +1,9 @@
 //! Accuracy after a fixed number of touches.
 
-use super::Candidate;
 use super::Estimate;
 use super::margins::Margins;
 use crate::error::{Error, Result};
+use crate::evidence::{Counted, Follower, Sums, follow};
 use rayon::prelude::*;
 
 /// Share of groups in which the object with the most evidence was the right one, after 1, 2, 3 … touches.
@@ -33,18 +33,15 @@ impl Margins<'_> {
         if most > 0 || groups == 0 {
             self.check(most, groups)?;
         }
-        let correct = (0..self.tested.len()).map(|position| {
-            let group = |mut correct: Vec<usize>, group| {
-                self.follow(position, group, most, seed, |touches, evidence| {
-                    correct[touches - 1] += usize::from(self.best(position, evidence) == self.tested[position].object);
-                });
-                correct
+        let correct = |position| {
+            let run = |group, see: &mut See<'_>| {
+                let touches = self.draw(position, group, most, seed).map(Some);
+                let Ok(_) =
+                    follow(&mut self.steps(position, touches), &mut self.sums(), |sums, counted| see(sums, counted));
             };
-            let none = || vec![0; most];
-            let add = |a: Vec<usize>, b: Vec<usize>| a.iter().zip(b).map(|(a, b)| a + b).collect();
-            (0..groups).into_par_iter().fold(none, group).reduce(none, add)
-        });
-        Ok(Curve { groups, correct: correct.collect() })
+            self.recognized(position, groups, [most, 0], run).touches.split_off(1)
+        };
+        Ok(Curve { groups, correct: (0..self.tested.len()).map(correct).collect() })
     }
 
     /// Confusion matrix after `touches` touches: number of groups of each tested object (rows) recognized as each known
@@ -68,9 +65,9 @@ impl Margins<'_> {
         self.check(most, groups)?;
         let row = |position| {
             let mut row = vec![0; self.objects.len()];
-            self.ends(position, (touches, most), groups, seed, |evidence| match self.is_of_any_placement(position) {
-                true => self.output(evidence),
-                false => self.best(position, evidence),
+            self.ends(position, (touches, most), groups, seed, |sums| match self.is_of_any_placement(position) {
+                true => sums.leader(),
+                false => self.named(position, sums.leader()),
             })
             .into_iter()
             .for_each(|object| row[object] += 1);
@@ -86,15 +83,12 @@ impl Margins<'_> {
     pub fn confidences(&self, touches: usize, groups: usize, seed: u64) -> Result<Vec<Confidence>> {
         self.check(touches, groups)?;
         // What is shown is a posterior at the model's temperature.
-        let unit = match self.candidate {
-            Candidate::Compiled(model) => self.unit() / model.temperature().value(),
-            Candidate::Full(_) => self.unit(),
-        };
+        let unit = f64::from(self.model.unit()) / self.model.temperature().value();
         let confidences = |position: usize| {
             let right = self.tested[position].object;
-            self.ends(position, (touches, touches), groups, seed, move |evidence| {
-                let (best, rivals) = self.leading(position, evidence, unit);
-                Confidence { posterior: 1.0 / (1.0 + rivals), correct: best == right }
+            self.ends(position, (touches, touches), groups, seed, move |sums| {
+                let (best, rivals) = sums.leading(unit);
+                Confidence { posterior: 1.0 / (1.0 + rivals), correct: self.named(position, best) == right }
             })
         };
         Ok((0..self.tested.len()).flat_map(confidences).collect())
@@ -118,33 +112,86 @@ impl Margins<'_> {
         }
     }
 
-    /// Adds up the margins of a group, and shows the evidence after each touch.
-    fn follow(&self, position: usize, group: usize, most: usize, seed: u64, mut see: impl FnMut(usize, &[f64])) {
-        let mut evidence = self.prior();
-        for (index, touch) in self.draw(position, group, most, seed).into_iter().enumerate() {
-            self.tested[position].add(touch, &mut evidence);
-            see(index + 1, &evidence);
-        }
+    /// Sums of a model's margins, with the evidence that there is before any touch.
+    pub(super) fn sums(&self) -> Sums<'_> {
+        Sums::new(self.model, self.weights.as_deref())
     }
 
-    /// Applies `end` to the evidence after the first touches of each group of so many.
+    /// Applies `end` to the sums of the first touches of each group of so many.
     fn ends<T: Send>(
         &self,
         position: usize,
         (touches, most): (usize, usize),
         groups: usize,
         seed: u64,
-        end: impl Fn(&[f64]) -> T + Sync,
+        end: impl Fn(&Sums<'_>) -> T + Sync,
     ) -> Vec<T> {
         let group = |group| {
-            let mut evidence = self.prior();
-            self.draw(position, group, most, seed).into_iter().take(touches).for_each(|touch| {
-                self.tested[position].add(touch, &mut evidence);
-            });
-            end(&evidence)
+            let mut sums = self.sums();
+            let first = self.draw(position, group, most, seed).take(touches).map(Some);
+            let Ok(_) = follow(&mut self.steps(position, first), &mut sums, |_, _| false);
+            end(&sums)
         };
         (0..groups).into_par_iter().map(group).collect()
     }
+
+    /// Counts how often a tested object leads after each number of touches and of approaches, up to the most of each, in
+    /// sequences that `run` follows by their numbers. A sequence that ends before keeps what it has; one without any evidence
+    /// has recognized nothing.
+    pub(super) fn recognized(
+        &self,
+        position: usize,
+        groups: usize,
+        most: [usize; 2],
+        run: impl Fn(usize, &mut See<'_>) + Sync,
+    ) -> Recognized {
+        let object = self.tested[position].object;
+        let none = || Recognized { touches: vec![0; most[0] + 1], approaches: vec![0; most[1] + 1], made: [0; 2] };
+        let add = |counts: &mut [usize], from: usize, to: usize| {
+            let end = to.min(counts.len());
+            counts[from.min(end)..end].iter_mut().for_each(|count| *count += 1);
+        };
+        let group = |mut counts: Recognized, group| {
+            // Touches and approaches of a state, which counts up to the next one, and whether the object led.
+            let mut last = (0, 0, false);
+            run(group, &mut |follower, Counted { touches, approaches, .. }| {
+                let (touches, approaches) = (touches as usize, approaches as usize);
+                if last.2 {
+                    add(&mut counts.touches, last.0, touches);
+                    add(&mut counts.approaches, last.1, approaches);
+                }
+                last = (touches, approaches, touches > 0 && follower.is_same(follower.leader(), object));
+                touches >= most[0] && approaches >= most[1]
+            });
+            let (touches, approaches, leads) = last;
+            if leads {
+                add(&mut counts.touches, touches, usize::MAX);
+                add(&mut counts.approaches, approaches, usize::MAX);
+            }
+            counts.made = [counts.made[0] + approaches, counts.made[1] + touches];
+            counts
+        };
+        let sum = |mut a: Recognized, b: Recognized| {
+            a.touches.iter_mut().zip(b.touches).for_each(|(a, b)| *a += b);
+            a.approaches.iter_mut().zip(b.approaches).for_each(|(a, b)| *a += b);
+            a.made = [a.made[0] + b.made[0], a.made[1] + b.made[1]];
+            a
+        };
+        (0..groups).into_par_iter().fold(none, group).reduce(none, sum)
+    }
+}
+
+/// Sees a state of a sequence; true if it has seen enough.
+pub(super) type See<'s> = dyn FnMut(&dyn Follower<Step = [i32]>, Counted) -> bool + 's;
+
+/// Sequences of a tested object in which it leads.
+pub(super) struct Recognized {
+    /// After each number of touches.
+    pub(super) touches: Vec<usize>,
+    /// After each number of approaches.
+    pub(super) approaches: Vec<usize>,
+    /// Approaches made, and those that were evidence.
+    pub(super) made: [usize; 2],
 }
 
 impl Curve {

@@ -1,32 +1,28 @@
 //! A model's margins for every test touch, computed once.
 
-use super::Candidate;
 use super::together::margins_of_touches;
 use super::unfit::raw_features;
-use crate::ensemble::{OverTouches, StatedProbe, TouchOrigin, feature_row, object_of, stroke_of};
+use crate::compile;
+use crate::ensemble::{StatedProbe, object_of, stroke_of};
 use crate::error::{Error, Result, problem};
+use crate::evidence::{Drawer, Given};
 use crate::probe::hand;
-use crate::random::{self, Purpose};
+use crate::random::Purpose;
 use crate::touches::{Dataset, ObjectTouches, Pool};
-use palpate_onboard::{Model, Recognizer, Refused, Stopping};
-use palpate_shared::format::{TrainedProbe, TrainedTouches};
+use palpate_onboard::{Model, Refused};
 use palpate_shared::{Descriptor, Touch};
-use rayon::prelude::*;
 use std::borrow::Cow;
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 /// A model's margins for every touch of a data set.
 pub struct Margins<'m> {
-    pub(super) candidate: Candidate<'m>,
+    pub(super) model: &'m Model<'m>,
     pub(super) descriptor: Descriptor,
     /// The objects that the model has margins for, in its order; the last one may be a background.
     pub(crate) objects: Vec<String>,
-    /// Number of them that can be named: all but a background.
-    known: usize,
-    /// The number of each output's object, where several belong to one.
-    numbers: Option<Vec<u8>>,
     /// The data set's objects.
-    pub(super) tested: Vec<Tested<'m>>,
+    pub(super) tested: Vec<Tested>,
     pub(crate) tested_names: Vec<String>,
     pub(super) hold_approaches: bool,
     /// True if a real probe made the touches.
@@ -41,7 +37,7 @@ pub struct Margins<'m> {
 const STRANGER: usize = usize::MAX;
 
 /// The margins of one object's test touches.
-pub(super) struct Tested<'m> {
+pub(super) struct Tested {
     /// The object's index in the model, or [`STRANGER`]; of several outputs that it may be of, the first.
     pub(super) object: usize,
     /// The outputs that it may be of: several where nothing says which of its placements was touched.
@@ -52,8 +48,8 @@ pub(super) struct Tested<'m> {
     pub(super) approaches: Vec<Option<u32>>,
     /// One for each source and robot: group i, and sequence i, is of pool i modulo their number.
     pub(super) pools: Vec<TestedPool>,
-    /// Margins of the touches that are evidence.
-    pub(super) values: Values<'m>,
+    /// Margins of the touches that are evidence, touch after touch one for each output, in the model's units.
+    pub(super) values: Vec<i32>,
 }
 
 /// Touches of one source, such as an instance, by one robot.
@@ -67,25 +63,10 @@ pub(super) struct TestedPool {
     fewest_evidence: usize,
 }
 
-/// Margins of touch after touch, one for each object that the model knows.
-pub(super) enum Values<'m> {
-    Full(Vec<f32>),
-    /// In the model's units.
-    Compiled(&'m Model<'m>, Vec<i32>),
-}
-
-/// A [`Candidate`] and touches.
+/// A [`Model`] and touches.
 pub(crate) trait OfTouches {
-    /// The descriptor, if the model is over touches.
-    fn descriptor(&self) -> Option<Descriptor>;
-    /// The touches that are evidence to the model.
-    fn trained_touches(&self) -> TrainedTouches;
-    /// The probe that the model states, if it states one.
-    fn probe(&self) -> Result<Option<TrainedProbe>>;
     /// The descriptor, if the data set's touches can be evidence; see [`Margins::new`].
     fn takes(&self, dataset: &Dataset) -> Result<Descriptor>;
-    /// The number of each output's object, where several belong to one.
-    fn numbers(&self) -> Option<Vec<u8>>;
     /// The outputs of the object with this name: its own or, where it has one for each placement, all of them. None if the model
     /// does not know it.
     fn outputs_of(&self, name: &str) -> Vec<usize>;
@@ -118,38 +99,7 @@ fn objects_of(outputs: &[String], has_placements: bool) -> Vec<String> {
     names
 }
 
-impl OfTouches for Candidate<'_> {
-    fn descriptor(&self) -> Option<Descriptor> {
-        match self {
-            Self::Full(ensemble) => ensemble.descriptor(),
-            Self::Compiled(model) => model.descriptor(),
-        }
-    }
-
-    fn trained_touches(&self) -> TrainedTouches {
-        match self {
-            Self::Full(ensemble) => ensemble.trained_touches(),
-            Self::Compiled(model) => model.trained_touches(),
-        }
-    }
-
-    fn probe(&self) -> Result<Option<TrainedProbe>> {
-        Ok(match self {
-            Self::Full(ensemble) => TouchOrigin::of(&ensemble.origin)?.probe.as_ref().map(StatedProbe::trained),
-            Self::Compiled(model) => model.probe(),
-        })
-    }
-
-    fn numbers(&self) -> Option<Vec<u8>> {
-        match self {
-            Self::Full(ensemble) => {
-                let outputs = TouchOrigin::of(&ensemble.origin).ok()?.outputs(&ensemble.objects)?;
-                Some(outputs.into_iter().map(|(number, _)| number).collect())
-            }
-            Self::Compiled(model) => model.outputs().map(|outputs| outputs.objects().collect()),
-        }
-    }
-
+impl OfTouches for Model<'_> {
     fn takes(&self, dataset: &Dataset) -> Result<Descriptor> {
         let descriptor = self.descriptor().ok_or_else(raw_features)?;
         let mut touches = dataset.touches();
@@ -158,17 +108,16 @@ impl OfTouches for Candidate<'_> {
                 .fix("Capture the touches with their pose."));
         }
         let longest = self.trained_touches().largest_spread;
-        StatedProbe::compare_with(["the model", "the data set"], self.probe()?, longest, dataset)?;
+        StatedProbe::compare_with(["the model", "the data set"], self.probe(), longest, dataset)?;
         Ok(descriptor)
     }
 
     fn outputs_of(&self, name: &str) -> Vec<usize> {
-        let mut known = self.objects();
-        known.truncate(self.known_count());
+        let known = known(self);
         if let Some(own) = known.iter().position(|known| known == name) {
             return vec![own];
         }
-        let has_placements = self.numbers().is_some();
+        let has_placements = self.outputs().is_some();
         (0..known.len()).filter(|&output| has_placements && object_of(&known[output]) == name).collect()
     }
 
@@ -176,14 +125,13 @@ impl OfTouches for Candidate<'_> {
         let descriptor = self.takes(dataset)?;
         let index = |touched: &ObjectTouches| {
             let unknown = || {
-                let mut known = self.objects();
-                known.truncate(self.known_count());
+                let known = known(self);
                 // Of an object that is known in other placements, these.
                 let object = object_of(&touched.name);
                 let is_placed = object != touched.name && !self.outputs_of(object).is_empty();
                 let known = match is_placed {
                     true => self.outputs_of(object).into_iter().map(|output| known[output].clone()).collect(),
-                    false => objects_of(&known, self.numbers().is_some()),
+                    false => objects_of(&known, self.outputs().is_some()),
                 };
                 unknown_object(&touched.name, &known)
             };
@@ -194,9 +142,16 @@ impl OfTouches for Candidate<'_> {
 
     fn delivered<'d>(&self, dataset: &'d Dataset) -> Cow<'d, Dataset> {
         let window = self.trained_touches().largest_spread;
-        let has_stroke = self.probe().is_ok_and(|probe| probe.is_some_and(|probe| probe.stroke.is_some()));
+        let has_stroke = self.probe().is_some_and(|probe| probe.stroke.is_some());
         dataset.within(has_stroke.then_some(window))
     }
+}
+
+/// The outputs that a model can name.
+fn known(model: &Model<'_>) -> Vec<String> {
+    let mut names = compile::names(model);
+    names.truncate(model.known_count());
+    names
 }
 
 /// The problem of an object that is not among those that a model knows.
@@ -221,31 +176,30 @@ impl<'m> Margins<'m> {
     /// # Errors
     /// If model and data set state different probes, or recorded touches show another stroke than the model's; if the model does
     /// not know an object, works on rows of features instead of touches, or needs a pose that no touch has.
-    pub fn new(candidate: Candidate<'m>, dataset: &Dataset) -> Result<Self> {
-        let (descriptor, _) = candidate.of(dataset)?;
-        let outputs = dataset.objects.iter().map(|touched| candidate.outputs_of(&touched.name)).collect();
-        Ok(Self::with(candidate, descriptor, outputs, dataset))
+    pub fn new(model: &'m Model<'m>, dataset: &Dataset) -> Result<Self> {
+        let (descriptor, _) = model.of(dataset)?;
+        let outputs = dataset.objects.iter().map(|touched| model.outputs_of(&touched.name)).collect();
+        Ok(Self::with(model, descriptor, outputs, dataset))
     }
 
     /// Margins for objects that the model does not know: no verdict on them is right.
     ///
     /// # Errors
     /// Errors of [`new`](Self::new), and when the model knows one.
-    pub(crate) fn of_strangers(candidate: Candidate<'m>, dataset: &Dataset) -> Result<Self> {
-        let descriptor = candidate.takes(dataset)?;
-        let is_known = |name: &&String| !candidate.outputs_of(name).is_empty();
+    pub(crate) fn of_strangers(model: &'m Model<'m>, dataset: &Dataset) -> Result<Self> {
+        let descriptor = model.takes(dataset)?;
+        let is_known = |name: &&String| !model.outputs_of(name).is_empty();
         if let Some(object) = dataset.objects.iter().map(|object| &object.name).find(is_known) {
             return Err(problem!("the model knows the object {object}, so it is not a stranger")
                 .fix("Take it out of the strangers, or train a model without it."));
         }
-        Ok(Self::with(candidate, descriptor, vec![Vec::new(); dataset.objects.len()], dataset))
+        Ok(Self::with(model, descriptor, vec![Vec::new(); dataset.objects.len()], dataset))
     }
 
     /// The outputs of each object; none of a stranger.
-    fn with(candidate: Candidate<'m>, descriptor: Descriptor, outputs: Vec<Vec<usize>>, dataset: &Dataset) -> Self {
-        let objects = candidate.objects();
-        let trained = candidate.trained_touches();
-        let delivered = candidate.delivered(dataset);
+    fn with(model: &'m Model<'m>, descriptor: Descriptor, outputs: Vec<Vec<usize>>, dataset: &Dataset) -> Self {
+        let trained = model.trained_touches();
+        let delivered = model.delivered(dataset);
         let dataset = delivered.as_ref();
         let tested = dataset.objects.iter().zip(outputs).map(|(touched, outputs)| {
             let is_evidence = |touch: &&Touch| Refused::check(&trained, touch).is_ok();
@@ -259,18 +213,15 @@ impl<'m> Margins<'m> {
                 touches: evidence.len(),
                 pools: pools(touched, &approaches),
                 approaches,
-                values: values(candidate, descriptor, &evidence),
+                values: margins_of_touches(model, &evidence),
             }
         });
         let tested = tested.collect();
         let (tested_names, hold_approaches, shares) = (dataset.names(), dataset.holds_approaches(), dataset.shares());
-        let known = candidate.known_count();
         Self {
-            candidate,
+            model,
             descriptor,
-            objects,
-            known,
-            numbers: candidate.numbers(),
+            objects: compile::names(model),
             tested,
             tested_names,
             hold_approaches,
@@ -290,7 +241,7 @@ impl<'m> Margins<'m> {
     pub(crate) fn expecting(mut self, weights: Vec<u32>) -> Result<Self> {
         let objects = self.objects.len();
         let has_weight = |output: &usize| weights.get(*output).is_some_and(|&weight| weight > 0);
-        let is_there = |tested: &Tested<'_>| tested.outputs.iter().any(has_weight);
+        let is_there = |tested: &Tested| tested.outputs.iter().any(has_weight);
         if weights.len() != objects || !self.tested.iter().any(is_there) {
             let allowed =
                 format!("{objects} weights, one for each object, and above 0 for one object of the data set or more");
@@ -307,10 +258,9 @@ impl<'m> Margins<'m> {
 
     /// Frequency of touches of a tested object, compared with others: that of its placements together.
     pub(crate) fn frequency(&self, position: usize) -> f64 {
-        let of = |&output: &usize| match (&self.weights, self.candidate) {
-            (Some(weights), _) => weights.get(output).copied().unwrap_or(0).into(),
-            (None, Candidate::Compiled(model)) => (f64::from(model.prior(output)) * f64::from(model.unit())).exp(),
-            (None, Candidate::Full(_)) => self.full_shares().get(output).copied().unwrap_or(1.0),
+        let of = |&output: &usize| match &self.weights {
+            Some(weights) => weights.get(output).copied().unwrap_or(0).into(),
+            None => (f64::from(self.model.prior(output)) * f64::from(self.model.unit())).exp(),
         };
         match &self.tested[position].outputs[..] {
             [] => of(&STRANGER),
@@ -325,51 +275,14 @@ impl<'m> Margins<'m> {
 
     /// Number of outputs that were tested.
     pub(super) fn tested_outputs(&self) -> usize {
-        let outputs: std::collections::BTreeSet<usize> =
-            self.tested.iter().flat_map(|tested| tested.outputs.iter().copied()).collect();
+        let outputs: BTreeSet<usize> = self.tested.iter().flat_map(|tested| tested.outputs.iter().copied()).collect();
         outputs.len()
-    }
-
-    /// Shares of an ensemble's outputs of their objects; empty where each is an object.
-    fn full_shares(&self) -> Vec<f64> {
-        let Candidate::Full(ensemble) = self.candidate else { return Vec::new() };
-        let outputs = TouchOrigin::of(&ensemble.origin).ok().and_then(|origin| origin.outputs(&ensemble.objects));
-        outputs.into_iter().flatten().map(|(_, share)| share).collect()
-    }
-
-    /// The object that the model would name, as the right one's output if it is the tested object; and the sum of the weights of
-    /// the others, its own being 1.
-    pub(super) fn leading(&self, position: usize, evidence: &[f64], unit: f64) -> (usize, f64) {
-        let (best, rivals) = leading(evidence, self.known, self.numbers.as_deref(), unit);
-        (self.named(position, best), rivals)
     }
 
     /// The output that stands for an object that was named: that of the touched placement, if it is one of the tested object.
     pub(super) fn named(&self, position: usize, output: usize) -> usize {
         let touched = self.tested[position].object;
-        let is_same = self
-            .numbers
-            .as_ref()
-            .is_some_and(|numbers| output < self.known && touched < self.known && numbers[output] == numbers[touched]);
-        if is_same { touched } else { output }
-    }
-
-    /// The number of each output's object, where several belong to one.
-    pub(super) fn numbers(&self) -> Option<&[u8]> {
-        self.numbers.as_deref()
-    }
-
-    /// The object with the most evidence among those that can be named; as the right output, if it is that of the tested object.
-    pub(super) fn best(&self, position: usize, evidence: &[f64]) -> usize {
-        match self.numbers {
-            None => best(&evidence[..self.known]),
-            Some(_) => self.leading(position, evidence, self.unit()).0,
-        }
-    }
-
-    /// The output with the most evidence of the object that leads.
-    pub(super) fn output(&self, evidence: &[f64]) -> usize {
-        leading(evidence, self.known, self.numbers.as_deref(), self.unit()).0
+        if self.model.is_same_object(output, touched) { touched } else { output }
     }
 
     /// The touches of all tested objects together that are evidence to the model.
@@ -385,18 +298,6 @@ impl<'m> Margins<'m> {
     /// The most approaches that every group of a tested object can have.
     pub(super) fn most_approaches(&self, position: usize) -> usize {
         self.tested[position].pools.iter().map(|pool| pool.fewest).min().unwrap_or(0)
-    }
-
-    /// The most approaches that group `group` of a tested object can have.
-    pub(super) fn most_approaches_of(&self, position: usize, group: usize) -> usize {
-        self.tested[position].pool(group).fewest
-    }
-
-    /// Number, among the touches that are evidence, of the `draw`-th approach of the pool of group `group`; `None` if
-    /// it is no evidence.
-    pub(super) fn approach(&self, position: usize, group: usize, draw: usize) -> Option<u32> {
-        let tested = &self.tested[position];
-        tested.approaches[tested.pool(group).touches[draw] as usize]
     }
 
     /// The fewest touches that are evidence that a tested object has: the longest group that can be drawn from each.
@@ -437,46 +338,39 @@ impl<'m> Margins<'m> {
         groups.and_then(|groups| u64::try_from(groups).ok()).unwrap_or(u64::MAX)
     }
 
-    /// Nats in one unit of evidence.
-    pub(super) fn unit(&self) -> f64 {
-        match self.candidate {
-            Candidate::Full(_) => 1.0,
-            Candidate::Compiled(model) => f64::from(model.unit()),
-        }
-    }
-
-    /// The evidence before any touch, in units.
-    pub(super) fn prior(&self) -> Vec<f64> {
-        if let Some(weights) = &self.weights {
-            let most = f64::from(weights.iter().copied().max().unwrap_or(1));
-            return match self.candidate {
-                Candidate::Full(_) => weights.iter().map(|&weight| (f64::from(weight) / most).ln()).collect(),
-                Candidate::Compiled(model) => {
-                    let never = Stopping::from_odds(0, u32::MAX);
-                    let told = Recognizer::<256>::new(model, never).ok().and_then(|mut recognizer| {
-                        recognizer.reset_to(weights).ok()?;
-                        Some(recognizer.evidence().iter().map(|&evidence| evidence as f64).collect())
-                    });
-                    told.unwrap_or_default()
-                }
-            };
-        }
-        let shares = self.full_shares();
-        let share = |object: usize| shares.get(object).copied().unwrap_or(1.0);
-        let prior = |object| match self.candidate {
-            Candidate::Full(_) => share(object).ln(),
-            Candidate::Compiled(model) => f64::from(model.prior(object)),
-        };
-        (0..self.objects.len()).map(prior).collect()
-    }
-
-    /// The positions of `count` touches of a tested object, drawn at random without replacement for group `group`.
-    pub(super) fn draw(&self, position: usize, group: usize, count: usize, seed: u64) -> Vec<usize> {
+    /// The touches of group `group` of a tested object, `count` of those that are evidence, drawn at random without replacement.
+    pub(super) fn draw(&self, position: usize, group: usize, count: usize, seed: u64) -> impl Iterator<Item = u32> {
         let pool = self.tested[position].pool(group);
-        let group = u64::try_from(group).unwrap_or(u64::MAX);
-        let mut random = random::generator(seed, Purpose::Groups, &self.tested_names[position], group);
-        let drawn = rand::seq::index::sample(&mut random, pool.fewest_evidence, count);
-        drawn.into_iter().map(|touch| pool.evidence[touch] as usize).collect()
+        let drawn = self.drawer(Purpose::Groups, position, seed).some(group as u64, pool.fewest_evidence, count);
+        drawn.map(|touch| pool.evidence[touch])
+    }
+
+    /// The approaches of a group in the order in which it has them: each the position of a touch among those that are evidence,
+    /// or none.
+    pub(super) fn draw_approaches(
+        &self,
+        position: usize,
+        group: usize,
+        seed: u64,
+    ) -> impl Iterator<Item = Option<u32>> {
+        let tested = &self.tested[position];
+        let pool = tested.pool(group);
+        let drawn = self.drawer(Purpose::Approaches, position, seed).each(group as u64, pool.fewest);
+        drawn.map(|approach| tested.approaches[pool.touches[approach] as usize])
+    }
+
+    fn drawer(&self, purpose: Purpose, position: usize, seed: u64) -> Drawer<'_> {
+        Drawer { purpose, name: &self.tested_names[position], seed }
+    }
+
+    /// Approaches as steps, by the positions of their touches among those that are evidence.
+    pub(super) fn steps(
+        &self,
+        position: usize,
+        approaches: impl Iterator<Item = Option<u32>>,
+    ) -> Given<'_, impl Iterator<Item = Option<&[i32]>>> {
+        let (values, objects) = (&self.tested[position].values, self.objects.len());
+        Given::new(approaches.map(move |touch| touch.map(|touch| &values[row(touch as usize, objects)])))
     }
 }
 
@@ -501,69 +395,14 @@ fn pools(touched: &ObjectTouches, approaches: &[Option<u32>]) -> Vec<TestedPool>
     tested.collect()
 }
 
-impl Tested<'_> {
+impl Tested {
     /// The pool of group `group`.
     pub(super) fn pool(&self, group: usize) -> &TestedPool {
         &self.pools[group % self.pools.len()]
-    }
-
-    /// Adds the margins of touch `touch` to `evidence`. Whole numbers stay exact: their sums are far below 2⁵³.
-    pub(super) fn add(&self, touch: usize, evidence: &mut [f64]) {
-        let row = row(touch, evidence.len());
-        match &self.values {
-            Values::Full(values) => {
-                evidence.iter_mut().zip(&values[row]).for_each(|(e, &margin)| *e += f64::from(margin))
-            }
-            Values::Compiled(_, values) => {
-                evidence.iter_mut().zip(&values[row]).for_each(|(e, &margin)| *e += f64::from(margin));
-            }
-        }
     }
 }
 
 /// Range of the margins of touch `touch`.
 pub(super) fn row(touch: usize, objects: usize) -> Range<usize> {
     touch * objects..(touch + 1) * objects
-}
-
-fn values<'m>(candidate: Candidate<'m>, descriptor: Descriptor, touches: &[&Touch]) -> Values<'m> {
-    match candidate {
-        Candidate::Full(ensemble) => {
-            let margins = |touch: &&Touch| ensemble.margins_of_features(&feature_row(descriptor, touch));
-            Values::Full(touches.par_iter().flat_map_iter(margins).collect())
-        }
-        Candidate::Compiled(model) => Values::Compiled(model, margins_of_touches(model, touches)),
-    }
-}
-
-/// The object with the most evidence; the first of several, as on the chip.
-pub(crate) fn best<T: PartialOrd>(evidence: &[T]) -> usize {
-    (0..evidence.len()).fold(0, |best, object| if evidence[object] > evidence[best] { object } else { best })
-}
-
-/// The output with the most evidence of the object that leads, and the sum of the other objects' weights, its own being 1. The
-/// first `known` outputs can be named; `numbers` are those of their objects, where several belong to one.
-pub(crate) fn leading(evidence: &[f64], known: usize, numbers: Option<&[u8]>, unit: f64) -> (usize, f64) {
-    let Some(numbers) = numbers else {
-        let best = best(&evidence[..known]);
-        return (best, rivals(evidence, best, unit));
-    };
-    let most = evidence.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let weight = |output: usize| ((evidence[output] - most) * unit).exp();
-    let object = |number: u8| (0..known).filter(move |&output| numbers[output] == number);
-    let last = numbers[..known].last().copied().unwrap_or(0);
-    let sum = |number: u8| object(number).map(weight).sum::<f64>();
-    let sums: Vec<f64> = (0..=last).map(sum).collect();
-    let leader = best(&sums);
-    let outputs: Vec<usize> = object(leader as u8).collect();
-    let strongest = best(&outputs.iter().map(|&output| evidence[output]).collect::<Vec<_>>());
-    let all: f64 = (0..evidence.len()).map(weight).sum();
-    (outputs[strongest], (all - sums[leader]) / sums[leader])
-}
-
-/// Sum of the other objects' weights, the best one's being 1: its posterior is 1 / (1 + this).
-pub(super) fn rivals(evidence: &[f64], best: usize, unit: f64) -> f64 {
-    let most = evidence[best];
-    let others = evidence.iter().enumerate().filter(|(object, _)| *object != best);
-    others.map(|(_, value)| ((value - most) * unit).exp()).sum()
 }

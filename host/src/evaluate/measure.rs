@@ -1,10 +1,11 @@
 //! Everything that is measured of a model on touches, as one call.
 
 use super::plan::{Active, evaluate_active};
-use super::{ActiveFacts, Candidate, Evaluation, LEAST_GROUPS, Margins, OnStrangers, Settings, evaluate, strangers};
+use super::{ActiveFacts, Evaluation, LEAST_GROUPS, Margins, OnStrangers, Settings, evaluate, strangers};
 use crate::error::{Error, Result};
 use crate::probe::noise::Noise;
 use crate::touches::Dataset;
+use palpate_onboard::Model;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -57,17 +58,13 @@ pub struct Evaluated {
 /// Errors of [`evaluate`] and [`Margins::new`]; for a plan or strangers that cannot be evaluated; [`Kind::Setting`](crate::error::Kind::Setting) `at` for more touches than there are enough
 /// different groups of.
 pub fn measure(
-    candidate: Candidate<'_>,
+    model: &Model<'_>,
     dataset: &Dataset,
     wanted: &Wanted<'_>,
     expecting: impl Fn(&[String], &[f64]) -> Result<Option<Vec<u32>>>,
 ) -> Result<Evaluated> {
-    let mut margins = Margins::new(candidate, dataset)?;
-    let own = match candidate {
-        Candidate::Compiled(model) => own_weights(model),
-        Candidate::Full(ensemble) => vec![1.0; ensemble.objects.len()],
-    };
-    if let Some(weights) = expecting(&margins.objects, &own)? {
+    let mut margins = Margins::new(model, dataset)?;
+    if let Some(weights) = expecting(&margins.objects, &own_weights(model))? {
         margins = margins.expecting(weights)?;
     }
     let settings = Settings {
@@ -85,7 +82,7 @@ pub fn measure(
         None => evaluate(&margins, &settings)?,
     };
     let strangers = wanted.unknown.map(|(directory, dataset)| {
-        let unknown = Margins::of_strangers(candidate, dataset).map_err(|error| error.in_file(directory))?;
+        let unknown = Margins::of_strangers(model, dataset).map_err(|error| error.in_file(directory))?;
         strangers((&margins, &evaluation.sequential), &unknown, &settings.sequences())
     });
     let strangers = strangers.transpose()?;
@@ -126,6 +123,6 @@ fn numbers_of_approaches(margins: &Margins<'_>, wanted: Option<&[usize]>) -> Vec
 }
 
 /// The weights that a model's own priors stand for.
-pub fn own_weights(model: &palpate_onboard::Model<'_>) -> Vec<f64> {
+pub fn own_weights(model: &Model<'_>) -> Vec<f64> {
     (0..model.object_count()).map(|object| (f64::from(model.prior(object)) * f64::from(model.unit())).exp()).collect()
 }

@@ -9,23 +9,21 @@
 //!
 //! A touch that the model was not trained for is no evidence: it costs an approach, and nothing else.
 //!
-//! A compiled model is evaluated by the onboard crate, the lines of code that run on the chip; an ensemble in f32 margins
-//! and f64 evidence, with the same stopping rule. The same seed draws the same groups for every model.
+//! Models are evaluated by the onboard crate, the lines of code that run on the chip; an ensemble is compiled first, with its
+//! own leaves ([`compile::exact`](crate::compile::exact)). The same seed draws the same groups for every model.
 //!
 //! Standard errors are those of the drawing of groups from the test touches.
 //!
 //! ```no_run
-//! use palpate::evaluate::model_file::ModelFile;
+//! use palpate::compile;
 //! use palpate::evaluate::{self, Margins};
 //! use palpate::touches::Dataset;
 //!
 //! # fn main() -> palpate::Result<()> {
-//! let model = ModelFile::load("model.palpate")?;
-//! let unseen = Dataset::read("unseen".as_ref())?;
-//! let evaluation = model.with(|candidate| {
-//!     let margins = Margins::new(candidate, &unseen)?;
-//!     evaluate::evaluate(&margins, &evaluate::Settings::default())
-//! })?;
+//! let compiled = compile::read_any("model.palpate")?;
+//! let (model, unseen) = (compiled.model(), Dataset::read("unseen".as_ref())?);
+//! let margins = Margins::new(&model, &unseen)?;
+//! let evaluation = evaluate::evaluate(&margins, &evaluate::Settings::default())?;
 //! println!("right after 10 touches: {:.1} %", 100.0 * evaluation.accuracy[&10]);
 //! println!("sure after {:.1} touches", evaluation.sequential.mean_touches);
 //! # Ok(())
@@ -36,11 +34,8 @@ mod approaches;
 #[cfg(feature = "train")]
 mod cost_of_noise;
 mod curve;
-mod draws;
-mod full;
 mod margins;
 mod measure;
-pub mod model_file;
 mod noisy;
 pub mod parity;
 mod plan;
@@ -59,20 +54,14 @@ pub use approaches::Approaches;
 pub use cost_of_noise::{CostOfNoise, LEAST as LEAST_FOR_COST, cost_of_noise};
 pub use curve::{Confidence, Curve};
 pub(crate) use margins::OfTouches;
-#[cfg(feature = "train")]
-pub(crate) use margins::best;
-#[cfg(feature = "train")]
-pub(crate) use margins::leading;
 pub use margins::{Margins, delivered};
 pub use measure::{Evaluated, Wanted, measure, own_weights};
 #[cfg(feature = "train")]
 pub(crate) use noisy::ROBOTS;
 pub use noisy::add_noise;
-pub use palpate_trees::verify::{
-    self, Candidate, Classes, Estimate, Regression, RowsEvaluation, evaluate_rows, predict,
-};
+pub use palpate_trees::verify::{self, Classes, Estimate, Regression, RowsEvaluation, evaluate_rows, predict};
 pub use plan::{ActiveFacts, Hardest, Planned, no_plan, plan};
-pub(crate) use plan::{check_approaches, no_pose_of};
+pub(crate) use plan::{by_pose, check_approaches};
 pub(crate) use promise::by_theory;
 pub use promise::{AlarmCheck, Finding, PromiseCheck};
 pub(crate) use sequential::significant;
@@ -87,12 +76,6 @@ use palpate_shared::ContactPattern;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Touches after which a recognizer gives up, unless its model says otherwise.
-pub const MAX_TOUCHES: u32 = 200;
-
-/// The error rate at which an ensemble's recognizer stops unless another is asked for.
-pub const ERROR_RATE: f64 = 0.01;
-
 /// Accuracies that rest on fewer different groups than this say little.
 pub const LEAST_GROUPS: u64 = 200;
 
@@ -106,10 +89,9 @@ pub struct Settings {
     pub at_approaches: Vec<usize>,
     /// Groups, and sequences, drawn for each object.
     pub groups: usize,
-    /// The recognizer stops when the posterior exceeds 1 minus this; `None` takes the model's own thresholds, 1 % for
-    /// an ensemble.
+    /// The recognizer stops when the posterior exceeds 1 minus this; `None` takes the model's own thresholds.
     pub error_rate: Option<f64>,
-    /// Touches after which the recognizer gives up; `None` takes the model's own limit, [`MAX_TOUCHES`] for an ensemble.
+    /// Touches after which the recognizer gives up; `None` takes the model's own limit.
     pub max_touches: Option<u32>,
     /// Seed of the drawing.
     pub seed: u64,

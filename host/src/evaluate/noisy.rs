@@ -26,8 +26,9 @@ pub fn add_noise(dataset: &mut Dataset, noise: &Noise, seed: u64) -> Result<usiz
 #[cfg(all(test, feature = "train"))]
 mod tests {
     use super::*;
+    use crate::compile;
     use crate::ensemble::train::{Settings, train};
-    use crate::evaluate::{Candidate, Margins};
+    use crate::evaluate::Margins;
     use crate::tests::synthetic;
     use crate::with;
     use std::collections::BTreeSet;
@@ -36,15 +37,17 @@ mod tests {
     fn every_group_is_of_one_robots_touches() {
         let mut dataset = synthetic::dataset(&[1_000, 760], 1);
         let ensemble = train(&dataset, &Settings { rounds: 2, ..Settings::compact() }, &()).unwrap();
+        let compiled = compile::exact(&ensemble).unwrap();
+        let model = compiled.model();
         let noise = with!(Noise::default(), speed_bias = 0.05);
         let robots = add_noise(&mut dataset, &noise, 1).unwrap();
         assert_eq!(robots, 3);
-        let margins = Margins::new(Candidate::Full(&ensemble), &dataset).unwrap();
+        let margins = Margins::new(&model, &dataset).unwrap();
         assert_eq!(margins.fewest_touches(), 253);
         for position in [0, 1] {
             let mut seen = BTreeSet::new();
             for group in 0..30 {
-                let drawn: Vec<usize> = margins.draw(position, group, 100, 1).into_iter().collect();
+                let drawn: Vec<usize> = margins.draw(position, group, 100, 1).map(|touch| touch as usize).collect();
                 let pool = &dataset.objects[position].pools()[group % robots];
                 assert!(drawn.iter().all(|touch| pool.range.contains(touch)));
                 assert_eq!(drawn.iter().collect::<BTreeSet<_>>().len(), 100);
@@ -59,6 +62,8 @@ mod tests {
     fn every_group_is_of_one_instances_touches_and_one_robots() {
         let mut dataset = synthetic::dataset(&[1_000, 760], 1);
         let ensemble = train(&dataset, &Settings { rounds: 2, ..Settings::compact() }, &()).unwrap();
+        let compiled = compile::exact(&ensemble).unwrap();
+        let model = compiled.model();
         let names = ["a", "b", "c", "d"].map(String::from);
         let object = &dataset.objects[1];
         dataset.objects[1] = ObjectTouches::in_turn(object.name.clone(), object.touches().to_vec(), &names, 0);
@@ -66,13 +71,13 @@ mod tests {
         for (robots, turns) in [(1, [1, 4]), (3, [3, 12]), (2, [2, 4])] {
             let mut of_robots = dataset.clone();
             of_robots.add_noise(&bias, 1, robots);
-            let margins = Margins::new(Candidate::Full(&ensemble), &of_robots).unwrap();
+            let margins = Margins::new(&model, &of_robots).unwrap();
             for (position, turns) in turns.into_iter().enumerate() {
                 for group in 0..30 {
-                    let drawn = margins.draw(position, group, 20, 1);
+                    let mut drawn = margins.draw(position, group, 20, 1).map(|touch| touch as usize);
                     let pools = of_robots.objects[position].pools();
                     let pool = &pools[group % turns].range;
-                    assert!(pools.len() == turns && drawn.iter().all(|touch| pool.contains(touch)), "{robots} robots");
+                    assert!(pools.len() == turns && drawn.all(|touch| pool.contains(&touch)), "{robots} robots");
                 }
             }
         }

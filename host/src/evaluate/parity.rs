@@ -1,18 +1,17 @@
 //! A compiled model compared with its ensemble: margins touch by touch, verdicts sequence by sequence.
 
-use super::Candidate;
-use super::full::FullRecognizer;
-use super::margins::{OfTouches, best, row};
+use super::margins::{OfTouches, row};
 use super::together::margins_of_touches;
 use super::unfit::{raw_features, too_many_objects};
 use crate::ensemble::{Ensemble, OverTouches};
-use crate::error::{Result, problem};
-use crate::evidence::Follower;
+use crate::error::{Error, Result, problem};
+use crate::evidence::{Drawer, best};
 use crate::progress::{self, Progress};
-use crate::random::{self, Purpose};
+use crate::random::Purpose;
 use crate::touches::{Dataset, ObjectTouches};
 use palpate_onboard::{Model, Recognizer, Refused, Stopping, Verdict};
 use palpate_shared::Touch;
+use palpate_trees::verify::plain::{Ended, Plain};
 use rand::RngExt;
 use rayon::prelude::*;
 
@@ -39,11 +38,14 @@ pub struct Parity {
 const CAPACITY: usize = 256;
 
 /// Compares a compiled model with its ensemble: on every touch of a data set, and on `sequences` sequences, each of
-/// touches drawn at random from those of one object's source, such as an instance, until there is a verdict. Both models stop by the compiled model's own rule.
+/// touches drawn at random from those of one object's source, such as an instance, until there is a verdict. The ensemble's
+/// margins are added up in [plain numbers](Plain), none of which the chip's code computes, and stop by the compiled model's own
+/// rule.
 ///
 /// # Errors
 /// When the two are not of the same objects and descriptor, their margins differ by more than the model
-/// states (it was exported from another ensemble), or an object of the data set has no touches; [`Kind::Cancelled`](crate::error::Kind::Cancelled).
+/// states (it was exported from another ensemble), a posterior or a verdict of the chip's code differs from the plain one by more
+/// than that explains, or an object of the data set has no touches; [`Kind::Cancelled`](crate::error::Kind::Cancelled).
 pub fn parity(
     ensemble: &Ensemble,
     model: &Model<'_>,
@@ -57,16 +59,13 @@ pub fn parity(
             problem!("there are no touches to compare the models on").fix("Give at least one touch of each object.")
         );
     }
-    let delivered = Candidate::Compiled(model).delivered(dataset);
+    let delivered = model.delivered(dataset);
     let dataset = delivered.as_ref();
     let touches: Vec<&Touch> = dataset.touches().collect();
     check(ensemble, model)?;
-    let full = FullMargins::new(ensemble, &touches, progress)?;
+    let full = margins_of_ensemble(ensemble, &touches, progress)?;
     let compiled = margins_of_touches(model, &touches);
-    let objects = model.object_count();
-    let rows = compiled.par_chunks_exact(objects).enumerate();
-    let margins = rows.map(|(index, compiled)| compare_margins(full.of(index), model, compiled));
-    let Difference { max_margin_error, best_differs } = margins.reduce(Difference::default, Difference::worse);
+    let Difference { max_margin_error, best_differs } = largest(model, &full, &compiled);
     let stated_bound = f64::from(model.margin_error());
     if max_margin_error > stated_bound {
         return Err(problem!(
@@ -83,15 +82,16 @@ pub fn parity(
     progress.begin("verdicts", Some(sequences as u64));
     let runs = (0..sequences).into_par_iter().map(|index| -> Result<_> {
         progress::advance(progress, 1)?;
-        let mut rng = random::generator(seed, Purpose::Sequences, "", index as u64);
+        let mut rng = Drawer { purpose: Purpose::Sequences, name: "", seed }.random(index as u64);
         let object = rng.random_range(0..dataset.objects.len());
         let pools = dataset.objects[object].pools();
         let pool = &pools[index % pools.len()].range;
         let draw = std::iter::repeat_with(|| {
             let index = firsts[object] + rng.random_range(pool.clone());
-            is_evidence[index].then(|| (full.of(index), &compiled[row(index, objects)]))
+            let row = row(index, model.object_count());
+            is_evidence[index].then(|| (&full[row.clone()], &compiled[row]))
         });
-        compare_verdicts::<CAPACITY>(ensemble, model, draw)
+        compare_verdicts::<CAPACITY>(model, draw)
     });
     let (verdict_differs, touches_differ) = runs.try_reduce(|| (0, 0), |a, b| Ok((a.0 + b.0, a.1 + b.1)))?;
     Ok(Parity {
@@ -123,29 +123,23 @@ impl Difference {
     }
 }
 
-/// The full model's margins of every touch of a data set. Sequences draw the same touches again and again.
-struct FullMargins {
-    objects: usize,
-    /// Row by row, one row per touch.
-    values: Vec<f32>,
+/// The ensemble's margins of touches, row by row.
+fn margins_of_ensemble(ensemble: &Ensemble, touches: &[&Touch], progress: &dyn Progress) -> Result<Vec<f32>> {
+    progress.begin("margins", Some(touches.len() as u64));
+    let objects = ensemble.objects.len();
+    let mut values = vec![0.0; objects * touches.len()];
+    values.par_chunks_mut(objects).zip(touches).try_for_each(|(row, touch)| -> Result<()> {
+        progress::advance(progress, 1)?;
+        row.copy_from_slice(&ensemble.margins(touch));
+        Ok(())
+    })?;
+    Ok(values)
 }
 
-impl FullMargins {
-    fn new(ensemble: &Ensemble, touches: &[&Touch], progress: &dyn Progress) -> Result<Self> {
-        progress.begin("margins", Some(touches.len() as u64));
-        let objects = ensemble.objects.len();
-        let mut values = vec![0.0; objects * touches.len()];
-        values.par_chunks_mut(objects).zip(touches).try_for_each(|(row, touch)| -> Result<()> {
-            progress::advance(progress, 1)?;
-            row.copy_from_slice(&ensemble.margins(touch));
-            Ok(())
-        })?;
-        Ok(Self { objects, values })
-    }
-
-    fn of(&self, touch: usize) -> &[f32] {
-        &self.values[touch * self.objects..(touch + 1) * self.objects]
-    }
+/// The largest difference of the margins of all touches.
+fn largest(model: &Model<'_>, full: &[f32], compiled: &[i32]) -> Difference {
+    let rows = full.par_chunks_exact(model.object_count()).zip(compiled.par_chunks_exact(model.object_count()));
+    rows.map(|(full, compiled)| compare_margins(full, model, compiled)).reduce(Difference::default, Difference::worse)
 }
 
 /// Compares a compiled model's margins with its ensemble's, touch by touch, on all threads.
@@ -159,14 +153,8 @@ pub fn difference(
     progress: &dyn Progress,
 ) -> Result<Difference> {
     check(ensemble, model)?;
-    progress.begin("margins", Some(touches.len() as u64));
-    let compiled = margins_of_touches(model, touches);
-    let compiled = compiled.par_chunks_exact(model.object_count());
-    let compared = touches.par_iter().zip(compiled).map(|(touch, compiled)| -> Result<_> {
-        progress::advance(progress, 1)?;
-        Ok(compare_margins(&ensemble.margins(touch), model, compiled))
-    });
-    compared.try_reduce(Difference::default, |a, b| Ok(a.worse(b)))
+    let full = margins_of_ensemble(ensemble, touches, progress)?;
+    Ok(largest(model, &full, &margins_of_touches(model, touches)))
 }
 
 /// Remedy for a model of another ensemble.
@@ -196,41 +184,102 @@ fn compare_margins(full: &[f32], model: &Model<'_>, compiled: &[i32]) -> Differe
 /// counted by either.
 ///
 /// # Errors
-/// When the model has more than `N` objects.
+/// When the model has more than `N` objects, or rounding explains no difference as large as that.
 fn compare_verdicts<'t, const N: usize>(
-    ensemble: &Ensemble,
     model: &Model<'_>,
     mut draw: impl Iterator<Item = Option<(&'t [f32], &'t [i32])>>,
 ) -> Result<(usize, usize)> {
     let stopping = Stopping::from_model(model);
-    let mut compiled = Recognizer::<N>::new(model, stopping).map_err(too_many_objects)?;
-    let prior = |object| f64::from(model.prior(object)) * f64::from(model.unit());
-    let priors = (0..ensemble.objects.len()).map(prior).collect();
-    let mut full = {
-        let numbers = model.outputs().map(|outputs| outputs.objects().collect());
-        FullRecognizer::new(priors, (ensemble.known_count(), numbers), stopping, Some(model))
-    };
+    let mut chip = Recognizer::<N>::new(model, stopping).map_err(too_many_objects)?;
+    let mut plain = plain(model, stopping);
     // Both take the same touches for as long as one of them wants more; afterwards each keeps its verdict. Where hardly
     // any touch is one that the model was trained for, there may never be a verdict.
     let mut draws = 100 * u64::from(stopping.max_touches());
     while let Some(margins) = draw.next()
         && draws > 0
-        && (compiled.verdict() == Verdict::Undecided || full.verdict == Verdict::Undecided)
+        && (chip.verdict() == Verdict::Undecided || plain.ended.is_none())
     {
         draws -= 1;
         if let Some((of_full, of_compiled)) = margins {
-            compiled.push_margins(of_compiled);
-            full.push(of_full);
+            let takes_more = chip.verdict() == Verdict::Undecided;
+            chip.push_margins(of_compiled);
+            plain.push(of_full);
+            if takes_more {
+                check_decision(model, &chip, &plain)?;
+            }
         }
     }
-    Ok(match (compiled.verdict(), full.verdict) {
-        (a, b) if a == b => (0, 0),
-        (
-            Verdict::Recognized { object: a, touches: first, .. },
-            Verdict::Recognized { object: b, touches: second, .. },
-        ) if a == b => (0, usize::from(first != second)),
+    Ok(match (chip.verdict(), plain.ended) {
+        (Verdict::Undecided, None) | (Verdict::GaveUp, Some(Ended { named: None, .. })) => (0, 0),
+        (Verdict::Recognized { object, touches, .. }, Some(Ended { named: Some(named), steps }))
+            if usize::from(object) == named =>
+        {
+            (0, usize::from(touches != steps))
+        }
         _ => (1, 0),
     })
+}
+
+/// A model's recognizer in plain numbers.
+fn plain(model: &Model<'_>, stopping: Stopping) -> Plain {
+    let outputs = 0..model.object_count();
+    let object = |output: usize| match model.outputs().and_then(|outputs| outputs.object(output)) {
+        Some(object) => object.into(),
+        // An object of its own, as a background is.
+        None => CAPACITY + output,
+    };
+    Plain {
+        evidence: outputs.clone().map(|output| f64::from(model.prior(output)) * f64::from(model.unit())).collect(),
+        objects: outputs.clone().map(object).collect(),
+        known: model.known_count(),
+        thresholds: outputs.map(|output| stopping.odds_of(output, model) as f64 / (1_u64 << 56) as f64).collect(),
+        most: stopping.max_touches(),
+        steps: 0,
+        ended: None,
+    }
+}
+
+/// Weights of rivals up to which the chip does not tell them apart.
+const RESOLUTION: f64 = 1e-14;
+/// The share of a weight, as a logarithm, by which the chip's exponential and its temperature may be off.
+const ARITHMETIC: f64 = 1e-3;
+
+/// Refuses a posterior or a verdict of the chip's code that is farther from that in plain numbers than rounded margins explain.
+fn check_decision<const N: usize>(model: &Model<'_>, chip: &Recognizer<'_, N>, plain: &Plain) -> Result<()> {
+    let beyond = |weight: f64, other: f64| ((weight + RESOLUTION) / (other + RESOLUTION)).ln();
+    // The margins of two outputs are off by as much with every touch.
+    let rounded = 2.0 * f64::from(plain.steps) * f64::from(model.margin_error());
+    let named = match chip.verdict() {
+        Verdict::Recognized { object, .. } => Some(usize::from(object)),
+        _ => None,
+    };
+    let output = named.unwrap_or_else(|| chip.best());
+    let temperature = model.temperature().value();
+    let posterior = chip.posterior_together(output).0;
+    let rivals = plain.rivals(output, temperature);
+    let is_off = beyond(posterior.complement() / posterior.to_f64(), rivals).abs() > rounded / temperature + ARITHMETIC;
+    let above = beyond(plain.rivals(output, 1.0), plain.thresholds[output]);
+    // A test of strangers holds names back, and plain numbers have none.
+    let has_test = model.strangers().is_some_and(|strangers| strangers.test.is_some());
+    let is_odd = match named {
+        Some(_) => above > rounded + ARITHMETIC,
+        None => above < -rounded - ARITHMETIC && !has_test,
+    };
+    if is_off || is_odd {
+        Err(wrong_decision(model, output, plain.steps, [posterior.to_f64(), 1.0 / (1.0 + rivals)]))
+    } else {
+        Ok(())
+    }
+}
+
+/// The problem of code of the chip that decides wrongly.
+fn wrong_decision(model: &Model<'_>, output: usize, touches: u32, [found, expected]: [f64; 2]) -> Error {
+    let object = model.object_name(output);
+    problem!(
+        "after {touches} touches the chip's code gives {object} a posterior of {found:.6}, and a plain sum of the ensemble's \
+         margins {expected:.6}, or its verdict does not follow from that: rounding does not explain it"
+    )
+    .fix("Export the model again with this version of palpate, and report it if that does not help.")
 }
 
 #[cfg(all(test, feature = "train"))]
@@ -260,9 +309,31 @@ mod tests {
         let mut compiled = [0; 3];
         model.margins(&touch, &mut compiled);
         let touches = || std::iter::repeat(Some((&margins[..], &compiled[..])));
-        let error = error(compare_verdicts::<2>(&ensemble, &model, touches()));
+        let error = error(compare_verdicts::<2>(&model, touches()));
         assert_eq!(error, "the model has 3 objects, and the recognizer has room for 2");
-        assert_eq!(compare_verdicts::<3>(&ensemble, &model, touches()).unwrap(), (0, 0));
+        assert_eq!(compare_verdicts::<3>(&model, touches()).unwrap(), (0, 0));
+    }
+
+    #[test]
+    fn a_decision_that_rounding_does_not_explain_is_an_error() {
+        let ensemble = ensemble();
+        let bytes = compile(&ensemble, &compile::Settings::default()).unwrap().bytes;
+        let model = compile::open(&bytes).unwrap();
+        let touches = synthetic::dataset(&[20, 20, 20], 3);
+        for touch in touches.touches() {
+            let full = ensemble.margins(touch);
+            let mut compiled = [0; 3];
+            model.margins(touch, &mut compiled);
+            let both = |compiled: &[i32; 3]| {
+                let (full, compiled) = (full.clone(), *compiled);
+                compare_verdicts::<3>(&model, std::iter::repeat(Some((&full[..], &compiled[..]))))
+            };
+            assert_eq!(both(&compiled).unwrap(), (0, 0));
+            // A hundredth of a nat more than the chip's margins are off by.
+            let more = ((f64::from(model.margin_error()) * 2.0 + 0.01) / f64::from(model.unit())) as i32;
+            compiled[1] += more;
+            assert!(error(both(&compiled)).contains("a plain sum of the ensemble's margins"));
+        }
     }
 
     #[test]

@@ -1,6 +1,5 @@
 //! Check of a model's promise.
 
-use super::Candidate;
 use super::Estimate;
 use super::margins::Margins;
 use crate::evidence::Outcome;
@@ -110,8 +109,7 @@ impl Margins<'_> {
     /// Compares the share of false alarms that the model's misfit test promises with sequences that stopped by its own
     /// thresholds. `None` if it has no test.
     pub(super) fn check_alarms(&self, outcomes: &[Vec<Outcome>]) -> Option<AlarmCheck> {
-        let Candidate::Compiled(model) = self.candidate else { return None };
-        let terms = model.strangers()?.test?.terms;
+        let terms = self.model.strangers()?.test?.terms;
         let promised = f64::from(terms.alarms) / 1e6;
         let of = |outcomes: &Vec<Outcome>| {
             let given = outcomes.len() as f64;
@@ -143,17 +141,13 @@ impl Margins<'_> {
         noise: &Noise,
         active: bool,
     ) -> Option<PromiseCheck> {
-        let Candidate::Compiled(model) = self.candidate else { return None };
+        let model = self.model;
         let promise = model.promise()?;
-        let named = |(name, wrong): (&String, &Wrong)| (Some(name.clone()), *wrong);
-        let found: Vec<(Option<String>, Wrong)> = match promise.per {
-            Per::Average => vec![(None, self.wrong_of(outcomes, |_, _| true))],
-            Per::Name => self.wrong_of_names(outcomes).iter().map(named).collect(),
-            Per::Object => self.wrong_of_objects(outcomes).iter().map(named).collect(),
-        };
-        let finding = Wrong::finding(found.iter().map(|(_, wrong)| wrong), promise.rate);
+        let found = self.wrong_of(outcomes, promise.per);
+        let finding = Wrong::finding(found.values(), promise.rate);
         let worst = found.into_iter().max_by(|(_, a), (_, b)| a.share().total_cmp(&b.share()));
-        let (of, error) = worst.map_or((None, Wrong::default().estimate()), |(of, wrong)| (of, wrong.estimate()));
+        let (of, wrong) = worst.unwrap_or_default();
+        let (of, error) = (Some(of).filter(|of| !of.is_empty()), wrong.estimate());
         let mut void = Vec::new();
         let simulated = Noise::of_promise(&promise.noise);
         // Recorded touches hold the noise of their probe: the promise is tested on that, and is not void.
@@ -168,9 +162,9 @@ impl Margins<'_> {
             let what = |approaches| if approaches { "every approach" } else { "full touches only" };
             void.push(format!("promised for {}, tested on {}", what(promise.approaches), what(self.hold_approaches)));
         }
-        let (known, tested) = (self.candidate.known_count(), self.tested_outputs());
+        let (known, tested) = (model.known_count(), self.tested_outputs());
         if tested < known {
-            let what = if self.numbers().is_some() { "placements" } else { "objects" };
+            let what = if model.outputs().is_some() { "placements" } else { "objects" };
             void.push(format!("promised for all {known} {what} of the model, tested on {tested}"));
         }
         let is_unstated = (0..self.tested.len()).any(|position| self.is_of_any_placement(position));
@@ -204,65 +198,42 @@ impl Margins<'_> {
         })
     }
 
-    /// The share of wrong names among those given of each name that is given.
-    pub(super) fn wrong_by_name(&self, outcomes: &[Vec<Outcome>]) -> BTreeMap<String, f64> {
-        self.wrong_of_names(outcomes).into_iter().map(|(name, wrong)| (name, wrong.share())).collect()
-    }
-
-    /// The share of wrong names among those given to each object that got one.
-    pub(super) fn wrong_by_object(&self, outcomes: &[Vec<Outcome>]) -> BTreeMap<String, f64> {
-        self.wrong_of_objects(outcomes).into_iter().map(|(name, wrong)| (name, wrong.share())).collect()
-    }
-
-    /// The share of wrong names among all that are given.
-    pub(super) fn wrong_of_given(&self, outcomes: &[Vec<Outcome>]) -> Estimate {
-        self.wrong_of(outcomes, |_, _| true).estimate()
-    }
-
-    /// The objects whose names are wrong more often than `rate`, by more than chance.
-    pub(super) fn objects_above(&self, outcomes: &[Vec<Outcome>], rate: f64) -> Vec<String> {
-        let objects = self.wrong_of_objects(outcomes);
-        let is_above = |wrong: &Wrong| Wrong::finding_of(*wrong, rate, objects.len()) == Finding::Broken;
-        objects.iter().filter(|(_, wrong)| is_above(wrong)).map(|(name, _)| name.clone()).collect()
-    }
-
-    fn wrong_of_names(&self, outcomes: &[Vec<Outcome>]) -> BTreeMap<String, Wrong> {
-        let wrong = |object: usize| self.wrong_of(outcomes, |_, named| named == object);
-        let names = self.objects.iter().cloned().enumerate();
-        names.map(|(object, name)| (name, wrong(object))).filter(|(_, of)| of.given > 0.0).collect()
-    }
-
-    fn wrong_of_objects(&self, outcomes: &[Vec<Outcome>]) -> BTreeMap<String, Wrong> {
-        let wrong = |position: usize| self.wrong_of(outcomes, |touched, _| touched == position);
-        let names = self.tested_names.iter().cloned().enumerate();
-        names.map(|(position, name)| (name, wrong(position))).filter(|(_, of)| of.given > 0.0).collect()
-    }
-
-    /// Share of wrong names among those that `counts` (tested object's position, named object), each tested object
-    /// weighted by its frequency.
-    fn wrong_of(&self, outcomes: &[Vec<Outcome>], counts: impl Fn(usize, usize) -> bool) -> Wrong {
-        let mut of = Wrong::default();
+    /// Wrong names among those given, by the cases that a rate is of: names, or tested objects, that there are; or all together.
+    /// Each tested object is weighted by its frequency.
+    pub(super) fn wrong_of(&self, outcomes: &[Vec<Outcome>], per: Per) -> BTreeMap<String, Wrong> {
+        let mut found = BTreeMap::<String, Wrong>::new();
         for (position, outcomes) in outcomes.iter().enumerate() {
             let weight = self.frequency(position);
             let is_any = self.is_of_any_placement(position);
             for outcome in outcomes {
                 let Some(name) = outcome.recognized else { continue };
-                // Of touches that may be of any placement, the one that was named counts.
-                let named = outcome.output.filter(|_| is_any).unwrap_or(name);
-                if counts(position, named) {
-                    of.given += weight;
-                    of.spread += weight * weight;
-                    of.wrong += if name == self.tested[position].object { 0.0 } else { weight };
-                }
+                let case = match per {
+                    Per::Average => "",
+                    // Of touches that may be of any placement, the one that was named counts.
+                    Per::Name => &self.objects[outcome.output.filter(|_| is_any).unwrap_or(name)],
+                    Per::Object => &self.tested_names[position],
+                };
+                let of = found.entry(case.into()).or_default();
+                of.given += weight;
+                of.spread += weight * weight;
+                of.wrong += if outcome.is_wrong(self.tested[position].object) { weight } else { 0.0 };
             }
         }
-        of
+        found
+    }
+
+    /// The objects whose names are wrong more often than `rate`, by more than chance.
+    pub(super) fn objects_above(&self, outcomes: &[Vec<Outcome>], rate: f64) -> Vec<String> {
+        let objects = self.wrong_of(outcomes, Per::Object);
+        let number = objects.len();
+        let is_above = |(_, wrong): &(String, Wrong)| wrong.finding_of(rate, number) == Finding::Broken;
+        objects.into_iter().filter(is_above).map(|(name, _)| name).collect()
     }
 }
 
 /// Names that are given, each with a weight.
 #[derive(Clone, Copy, Debug, Default)]
-struct Wrong {
+pub(super) struct Wrong {
     given: f64,
     wrong: f64,
     /// The sum of the weights' squares.
@@ -271,7 +242,7 @@ struct Wrong {
 
 impl Wrong {
     /// The share of wrong names; not a number if none is given.
-    fn share(&self) -> f64 {
+    pub(super) fn share(&self) -> f64 {
         self.wrong / self.given
     }
 

@@ -1,14 +1,12 @@
 //! Touching until sure.
 
-use super::Candidate;
 use super::Estimate;
-use super::full::FullRecognizer;
-use super::margins::{Margins, Values, row};
-use super::{ERROR_RATE, MAX_TOUCHES};
+use super::margins::Margins;
 use crate::compile;
 use crate::error::{Error, Result};
-use crate::evidence::{Given, Outcome, Totals, chip, outcome};
+use crate::evidence::{Outcome, Totals, chip, outcome};
 use palpate_onboard::Stopping;
+use palpate_shared::format::Per;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -16,11 +14,10 @@ use std::collections::BTreeMap;
 /// Settings for drawing and stopping sequences.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SequentialSettings {
-    /// The recognizer stops when the posterior exceeds 1 minus this; `None` takes the model's own thresholds, 1 % for
-    /// an ensemble.
+    /// The recognizer stops when the posterior exceeds 1 minus this; `None` takes the model's own thresholds.
     pub error_rate: Option<f64>,
-    /// Touches after which it gives up; `None` takes the model's own limit, [`MAX_TOUCHES`] for an ensemble. An object
-    /// with fewer test touches gives up when they are used up.
+    /// Touches after which it gives up; `None` takes the model's own limit. An object with fewer test touches gives up when
+    /// they are used up.
     pub max_touches: Option<u32>,
     /// Sequences for each object.
     pub sequences: usize,
@@ -110,9 +107,7 @@ impl Margins<'_> {
         let most = usize::try_from(stopping.max_touches()).unwrap_or(usize::MAX);
         let outcomes = self.each(sequences, |position, sequence| {
             let limit = most.min(self.most_touches_of(position, sequence));
-            let touches = self.draw(position, sequence, limit, seed).into_iter();
-            // A position is below the number of a file's lines.
-            self.outcome(position, stopping, touches.map(|touch| u32::try_from(touch).ok()))
+            self.outcome(position, stopping, self.draw(position, sequence, limit, seed).map(Some))
         });
         Ok(self.of_outcomes(outcomes, self.stated(settings, stopping), stopping.max_touches(), false))
     }
@@ -130,6 +125,8 @@ impl Margins<'_> {
         let approaches = in_approaches.then(|| self.mean(&outcomes, |outcome| outcome.approaches));
         let error = self.share(&outcomes, |totals| totals.wrong);
         let undecided = self.share(&outcomes, Totals::undecided);
+        let shares =
+            |per| self.wrong_of(&outcomes, per).into_iter().map(|(case, wrong)| (case, wrong.share())).collect();
         Sequential {
             error_rate,
             promised,
@@ -146,10 +143,10 @@ impl Margins<'_> {
             per_object: approaches.unwrap_or(touches).per_object,
             error_per_object: error.per_object,
             undecided_per_object: undecided.per_object,
-            error_of_given: self.wrong_of_given(&outcomes).value,
-            error_of_given_per_object: self.wrong_by_object(&outcomes),
+            error_of_given: self.wrong_of(&outcomes, Per::Average).remove("").unwrap_or_default().share(),
+            error_of_given_per_object: shares(Per::Object),
             above: self.objects_above(&outcomes, error_rate),
-            error_per_name: self.wrong_by_name(&outcomes),
+            error_per_name: shares(Per::Name),
             placement: if in_approaches { None } else { self.placement_named(&outcomes) },
             outcomes,
         }
@@ -158,7 +155,7 @@ impl Margins<'_> {
     /// Share of right names with the right placement, each tested placement weighted by its frequency; of touches that state
     /// theirs.
     fn placement_named(&self, outcomes: &[Vec<Outcome>]) -> Option<f64> {
-        self.numbers()?;
+        self.model.outputs()?;
         let (mut right, mut placed) = (0.0, 0.0);
         let stated = |(position, _): &(usize, &Vec<Outcome>)| !self.is_of_any_placement(*position);
         for (position, outcomes) in outcomes.iter().enumerate().filter(stated) {
@@ -209,34 +206,27 @@ impl Margins<'_> {
         if settings.sequences == 0 {
             return Err(Error::setting("groups", 0, "at least 1"));
         }
-        let own = match self.candidate {
-            Candidate::Full(_) => MAX_TOUCHES,
-            Candidate::Compiled(model) => Stopping::from_model(model).max_touches(),
-        };
-        let max_touches = settings.max_touches.unwrap_or(own);
-        match (settings.error_rate, self.candidate) {
+        let own = Stopping::from_model(self.model);
+        let max_touches = settings.max_touches.unwrap_or(own.max_touches());
+        match settings.error_rate {
             // The model's own thresholds stay as they are, to the last bit.
-            (None, Candidate::Compiled(model)) if max_touches > 0 => {
-                Ok(Stopping::from_model(model).with_max_touches(max_touches))
-            }
-            (error_rate, _) => Ok(compile::stopping(error_rate.unwrap_or(ERROR_RATE), max_touches)?),
+            None if max_touches > 0 => Ok(own.with_max_touches(max_touches)),
+            error_rate => Ok(compile::stopping(error_rate.unwrap_or(own.error_rate()), max_touches)?),
         }
     }
 
     /// Error rate that a recognizer with this stopping rule was asked to keep, and the model's promise for it.
     pub(super) fn stated(&self, settings: &SequentialSettings, stopping: Stopping) -> Stated {
-        match (settings.error_rate, self.candidate) {
-            (None, Candidate::Compiled(model)) => match model.promise() {
-                // Other priors than those of the calibration, or fewer objects: nothing was promised for these.
-                Some(promise) if self.weights.is_some() => {
-                    Stated { error_rate: promise.rate, promised: None, per: None }
-                }
-                Some(promise) => {
-                    Stated { error_rate: promise.rate, promised: Some(promise.rate), per: Some(promise.per.name()) }
-                }
-                None => Stated { error_rate: significant(stopping.error_rate()), promised: None, per: None },
-            },
-            (error_rate, _) => Stated { error_rate: error_rate.unwrap_or(ERROR_RATE), promised: None, per: None },
+        match (settings.error_rate, self.model.promise()) {
+            (Some(error_rate), _) => Stated { error_rate, promised: None, per: None },
+            // Other priors than those of the calibration, or fewer objects: nothing was promised for these.
+            (None, Some(promise)) if self.weights.is_some() => {
+                Stated { error_rate: promise.rate, promised: None, per: None }
+            }
+            (None, Some(promise)) => {
+                Stated { error_rate: promise.rate, promised: Some(promise.rate), per: Some(promise.per.name()) }
+            }
+            (None, None) => Stated { error_rate: significant(stopping.error_rate()), promised: None, per: None },
         }
     }
 
@@ -248,20 +238,8 @@ impl Margins<'_> {
         stopping: Stopping,
         approaches: impl Iterator<Item = Option<u32>>,
     ) -> Outcome {
-        let objects = self.objects.len();
-        let at = |touch: u32| row(touch as usize, objects);
-        let outcome = match &self.tested[position].values {
-            Values::Compiled(model, values) => {
-                let steps = approaches.map(|touch| touch.map(|touch| &values[at(touch)]));
-                outcome(&mut Given::new(steps), &mut *chip(model, stopping, self.weights.as_deref()))
-            }
-            Values::Full(values) => {
-                let known = (self.candidate.known_count(), self.numbers().map(<[u8]>::to_vec));
-                let steps = approaches.map(|touch| touch.map(|touch| &values[at(touch)]));
-                outcome(&mut Given::new(steps), &mut FullRecognizer::new(self.prior(), known, stopping, None))
-            }
-        };
-        let Ok(outcome) = outcome;
+        let mut steps = self.steps(position, approaches);
+        let Ok(outcome) = outcome(&mut steps, &mut *chip(self.model, stopping, self.weights.as_deref()));
         Outcome { recognized: outcome.recognized.map(|output| self.named(position, output)), ..outcome }
     }
 }

@@ -1,6 +1,5 @@
 //! Objects that a model does not know.
 
-use super::Candidate;
 use super::margins::Margins;
 use super::sequential::{Sequential, SequentialSettings};
 use crate::error::Result;
@@ -67,10 +66,7 @@ pub(crate) fn strangers(
     let named = strangers.share(&found.outcomes, |totals| totals.wrong);
     let alarms = known.0.share(&known.1.outcomes, |totals| totals.unknown);
     let all_used_up = mean(&used_up(limit));
-    let has_test = match strangers.candidate {
-        Candidate::Compiled(model) => model.strangers().is_some_and(|strangers| strangers.test.is_some()),
-        Candidate::Full(_) => false,
-    };
+    let has_test = strangers.model.strangers().is_some_and(|strangers| strangers.test.is_some());
     Ok(OnStrangers {
         has_test,
         false_alarms: alarms.all.value,

@@ -7,7 +7,7 @@ fn a_compiled_model_stops_as_the_recognizer_that_sees_the_touches() {
     let model = MODEL.model();
     // Positions count touches that are evidence: here all, since this model takes every touch with a contact.
     let touches = synthetic::dataset(&[400, 300, 500], 2);
-    let margins = Margins::new(Candidate::Compiled(&model), &touches).unwrap();
+    let margins = Margins::new(&model, &touches).unwrap();
     let settings = SequentialSettings { error_rate: Some(0.01), max_touches: Some(40), sequences: 50, seed: 1 };
     let sequential = margins.sequential(&settings).unwrap();
     for (position, outcomes) in sequential.outcomes.iter().enumerate() {
@@ -15,7 +15,7 @@ fn a_compiled_model_stops_as_the_recognizer_that_sees_the_touches() {
             let mut recognizer = Recognizer::<3>::new(&model, Stopping::new(0.01, 40).unwrap()).unwrap();
             let mut verdict = Verdict::Undecided;
             for touch in margins.draw(position, sequence, 40, 1) {
-                verdict = recognizer.push(&touches.objects[position].touches()[touch]).unwrap();
+                verdict = recognizer.push(&touches.objects[position].touches()[touch as usize]).unwrap();
                 if verdict != Verdict::Undecided {
                     break;
                 }

@@ -6,17 +6,22 @@
 //!     └─where to touch───┘
 //! ```
 //!
-//! A [`Supplier`] yields steps: touches that were captured before or are when they are needed, drawn at random or chosen by
-//! the follower's plan, or rows. A [`Follower`] adds them up: the chip's own recognizer ([`chip`]), or the full model. Everything
-//! above these two is the same for all of them: thresholds and promises take a [`Sequence`], figures take an [`Outcome`].
+//! A [`Supplier`] yields steps: touches that were captured before or are when they are needed, drawn at random ([`Drawer`]) or
+//! chosen by the follower's plan, or rows. A [`Follower`] adds them up: the chip's own recognizer ([`chip`]), or [`Sums`] that no
+//! verdict ends. Everything above these two is the same for all of them: thresholds and promises take a [`Sequence`], figures
+//! take an [`Outcome`].
 
 mod chip;
+mod draw;
 mod outcome;
 mod sequence;
+mod sums;
 #[cfg(test)]
 mod tests;
+mod turns;
 
 pub(crate) use chip::{Chip, chip};
+pub(crate) use draw::{Drawer, Draws};
 pub use outcome::Outcome;
 pub(crate) use outcome::{Totals, Unit, units};
 use palpate_onboard::{Familiarity, Verdict};
@@ -24,6 +29,8 @@ pub(crate) use sequence::totals;
 pub use sequence::{Lead, Odds, Sequence, margin_of, odds_of};
 use std::convert::Infallible;
 use std::marker::PhantomData;
+pub(crate) use sums::{Sums, best};
+pub(crate) use turns::Turns;
 
 /// Adds up the steps of a sequence.
 pub(crate) trait Follower {
@@ -172,26 +179,40 @@ pub(crate) fn sequences<F: Follower + ?Sized, S: Sequences<F> + ?Sized>(
     limit: Limit,
 ) -> Result<Vec<Sequence>, S::Error> {
     let strictest = odds_of(limit.margin);
+    each(supplier, follower, most, |sequence: &mut Sequence, follower, Counted { touches, approaches, verdict }| {
+        if verdict.is_none() {
+            // No evidence: it cost an approach.
+            sequence.end(approaches);
+            return false;
+        }
+        let (familiarity, leader, odds) = (follower.familiarity(), follower.leader(), follower.rivals());
+        let may_name = familiarity == Familiarity::Known;
+        // Of several outputs of the object that is touched, each is right.
+        let name = if follower.is_same(leader, sequence.object) { sequence.object } else { leader };
+        sequence.take(Lead { name, odds, touches, approaches }, may_name);
+        (may_name && odds <= strictest) || familiarity == Familiarity::Stranger || touches >= limit.max_touches
+    })
+}
+
+/// Follows up to `most` sequences of a supplier, each until `see`, called after each step, has seen enough.
+pub(crate) fn each<F: Follower + ?Sized, S: Sequences<F> + ?Sized, T: From<Sequence>>(
+    supplier: &mut S,
+    follower: &mut F,
+    most: usize,
+    mut see: impl FnMut(&mut T, &F, Counted) -> bool,
+) -> Result<Vec<T>, S::Error> {
     let mut found = Vec::new();
     while found.len() < most {
-        let Some(mut sequence) = supplier.begin()? else { break };
-        let is_whole = follow(supplier, follower, |follower, Counted { touches, approaches, verdict }| {
-            if verdict.is_none() {
-                // No evidence: it cost an approach.
-                sequence.end(approaches);
-                return false;
-            }
-            let (familiarity, leader, odds) = (follower.familiarity(), follower.leader(), follower.rivals());
-            let may_name = familiarity == Familiarity::Known;
-            // Of several outputs of the object that is touched, each is right.
-            let name = if follower.is_same(leader, sequence.object) { sequence.object } else { leader };
-            sequence.take(Lead { name, odds, touches, approaches }, may_name);
-            (may_name && odds <= strictest) || familiarity == Familiarity::Stranger || touches >= limit.max_touches
+        let Some(sequence) = supplier.begin()? else { break };
+        let (mut seen, mut steps) = (T::from(sequence), 0);
+        let is_whole = follow(supplier, follower, |follower, counted| {
+            steps = counted.approaches;
+            see(&mut seen, follower, counted)
         })?;
-        if !supplier.end(sequence.approaches, is_whole) {
+        if !supplier.end(steps, is_whole) {
             break;
         }
-        found.push(sequence);
+        found.push(seen);
     }
     Ok(found)
 }

@@ -1,11 +1,10 @@
 //! Sequences of touches, and how badly they fit after each touch.
 
 use super::{EARLY, FIRST, HALVED_AFTER, NAT, Pools};
-use crate::evaluate::leading;
-use crate::random::{self, Purpose};
+use crate::evidence::{self, Counted, Follower, Sequences, Sums, Supplier, Turns, each};
 use palpate_onboard::{Model, Stopping};
-use rand::seq::SliceRandom;
 use rayon::prelude::*;
+use std::convert::Infallible;
 
 /// End of sequences.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,6 +27,12 @@ struct State {
 /// One sequence of a known object's touches.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Sequence(Vec<State>);
+
+impl From<evidence::Sequence> for Sequence {
+    fn from(_: evidence::Sequence) -> Self {
+        Self(Vec::new())
+    }
+}
 
 /// End of a sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,11 +66,6 @@ impl Sequence {
     }
 }
 
-/// Puts the touches of an object's pool in a random order.
-pub(super) fn shuffle<T>(touches: &mut [T], name: &str, seed: u64, pool: u64) {
-    touches.shuffle(&mut random::generator(seed, Purpose::Misfit, name, pool));
-}
-
 /// Amount by which a misfit may exceed the threshold after this number of touches, in nats.
 pub(super) fn early(touches: u32) -> f64 {
     EARLY * libm::exp2(-f64::from(touches) / HALVED_AFTER)
@@ -75,78 +75,70 @@ pub(super) fn early(touches: u32) -> f64 {
 /// together: of each pool as many, in turn. A sequence that the touches end in is left out; one that a robot's touches end
 /// in ends there.
 pub(super) fn sequences(model: &Model<'_>, supplies: &[Pools], ending: Ending, most: usize) -> Vec<Vec<Sequence>> {
-    let objects = model.object_count();
     let of_each = most.div_ceil(supplies.len().max(1));
-    // Where several outputs belong to one object, it is the object that is named.
-    let numbers: Option<Vec<u8>> = model.outputs().map(|outputs| outputs.objects().collect());
-    let numbers = numbers.as_deref();
     let limit = match ending {
         Ending::Touches(touches) => touches,
         Ending::Named { .. } => Stopping::from_model(model).max_touches(),
     };
-    let of = |supply: &Pools| {
-        let mut all = Vec::new();
-        if supply.is_once {
-            let once = supply.pools.iter().take(of_each).map(|rows| {
-                let mut states = Vec::new();
-                one(model, numbers, &mut rows.chunks_exact(objects), (ending, limit), &mut states);
-                Sequence(states)
-            });
-            return once.filter(|sequence| !sequence.0.is_empty()).collect();
-        }
-        let mut pools: Vec<_> = supply.pools.iter().map(|rows| rows.chunks_exact(objects)).collect();
-        while all.len() < of_each && !pools.is_empty() {
-            let next = all.len() % pools.len();
-            let mut states = Vec::new();
-            if !one(model, numbers, &mut pools[next], (ending, limit), &mut states) {
-                break;
-            }
-            all.push(Sequence(states));
-        }
-        all
+    let see = |sequence: &mut Sequence, sums: &Sums<'_>, counted: Counted| {
+        let touches = counted.touches;
+        let misfit = model.misfit(sums.evidence(), touches).filter(|_| touches >= FIRST);
+        let level = misfit.map_or(f64::NEG_INFINITY, |misfit| misfit as f64 / NAT - early(touches));
+        let state = State { level, is_decided: is_decided(model, sums, touches) };
+        sequence.0.push(state);
+        let is_named = match ending {
+            Ending::Named { level } => touches >= FIRST && state.is_decided && state.level <= level,
+            Ending::Touches(_) => false,
+        };
+        is_named || touches >= limit
+    };
+    let of = |pools: &Pools| {
+        let Ok(found) = each(&mut Supply::new(pools, model.object_count()), &mut Sums::new(model, None), of_each, see);
+        found
     };
     supplies.par_iter().map(of).collect()
 }
 
-/// Follows one sequence; returns true if it ended before the touches did.
-fn one<'r>(
-    model: &Model<'_>,
-    numbers: Option<&[u8]>,
-    rows: &mut impl Iterator<Item = &'r [i32]>,
-    (ending, limit): (Ending, u32),
-    states: &mut Vec<State>,
-) -> bool {
-    let mut evidence: Vec<i64> = (0..model.object_count()).map(|object| model.prior(object).into()).collect();
-    for touches in 1..=limit {
-        let Some(row) = rows.next() else { return false };
-        evidence.iter_mut().zip(row).for_each(|(sum, &margin)| *sum += i64::from(margin));
-        let misfit = model.misfit(&evidence, touches).filter(|_| touches >= FIRST);
-        let level = misfit.map_or(f64::NEG_INFINITY, |misfit| misfit as f64 / NAT - early(touches));
-        let state = State { level, is_decided: is_decided(model, numbers, &evidence, touches) };
-        states.push(state);
-        match ending {
-            Ending::Named { level } if touches >= FIRST && state.is_decided && state.level <= level => break,
-            _ => {}
-        }
+/// Sequences of margins that were computed before.
+struct Supply<'p> {
+    pools: Vec<&'p [i32]>,
+    objects: usize,
+    turns: Turns,
+}
+
+impl<'p> Supply<'p> {
+    fn new(pools: &'p Pools, objects: usize) -> Self {
+        let all = pools.pools.iter().map(Vec::as_slice);
+        // A robot without touches makes no sequence, and the others do.
+        let pools_used: Vec<&[i32]> = all.filter(|rows| !(pools.is_once && rows.is_empty())).collect();
+        Self { turns: Turns::new(pools_used.len(), pools.is_once), pools: pools_used, objects }
     }
-    true
+}
+
+impl<F: Follower<Step = [i32]> + ?Sized> Supplier<F> for Supply<'_> {
+    type Error = Infallible;
+
+    fn step(&mut self, _: &F) -> Result<Option<Option<&[i32]>>, Infallible> {
+        let (pool, next) = self.turns.place();
+        self.turns.advance();
+        Ok(self.pools.get(pool).and_then(|rows| rows.chunks_exact(self.objects).nth(next)).map(Some))
+    }
+}
+
+impl<F: Follower<Step = [i32]> + ?Sized> Sequences<F> for Supply<'_> {
+    fn begin(&mut self) -> Result<Option<evidence::Sequence>, Infallible> {
+        Ok(self.turns.begin().then(|| evidence::Sequence::new(0)))
+    }
+
+    fn end(&mut self, steps: u32, is_whole: bool) -> bool {
+        self.turns.end(steps, is_whole)
+    }
 }
 
 /// True if the leader's posterior passes the model's threshold.
-fn is_decided(model: &Model<'_>, numbers: Option<&[u8]>, evidence: &[i64], touches: u32) -> bool {
-    if numbers.is_some() {
-        let unit = f64::from(model.unit()) * f64::from(model.weight_of(touches)) / 65_536.0;
-        let evidence: Vec<f64> = evidence.iter().map(|&sum| sum as f64).collect();
-        let (leader, rivals) = leading(&evidence, model.known_count(), numbers, unit);
-        return rivals <= Stopping::from_model(model).odds_of(leader, model) as f64 / 2.0_f64.powi(56);
-    }
-    let known = 0..model.known_count();
-    let leader = known.reduce(|best, other| if evidence[other] > evidence[best] { other } else { best }).unwrap_or(0);
+fn is_decided(model: &Model<'_>, sums: &Sums<'_>, touches: u32) -> bool {
     // A weight of 1 changes nothing.
-    let weight = f64::from(model.weight_of(touches)) / 65_536.0;
-    let ahead = |other: i64| (other - evidence[leader]) as f64 * f64::from(model.unit()) * weight;
-    let others = evidence.iter().enumerate().filter(|(object, _)| *object != leader);
-    let rivals: f64 = others.map(|(_, &other)| ahead(other).exp()).sum();
+    let (leader, rivals) = sums.leading(f64::from(model.unit()) * f64::from(model.weight_of(touches)) / 65_536.0);
     rivals <= Stopping::from_model(model).odds_of(leader, model) as f64 / 2.0_f64.powi(56)
 }
 

@@ -30,8 +30,10 @@ pub use shapes::captured;
 use crate::calibrate::{Found, Stop, Tally, walk};
 use crate::compile::{self, Restated, restate};
 use crate::error::{Error, Kind, Result, problem};
+use crate::evaluate::OfTouches;
 use crate::evaluate::together::margins_of_touches;
-use crate::evaluate::{Candidate, OfTouches};
+use crate::evidence::Drawer;
+use crate::random::Purpose;
 use crate::touches::{Dataset, ObjectTouches, Pool};
 use follow::{Ending, Sequence};
 use misfit::Moments;
@@ -287,9 +289,8 @@ fn learn_count(learn: &[Pools], objects: usize) -> usize {
 
 /// Touches of every known object, in the model's order: those that may follow each other in a random order.
 fn supplies(model: &Model<'_>, dataset: &Dataset, seed: u64) -> Result<Vec<Pools>> {
-    let candidate = Candidate::Compiled(model);
-    candidate.of(dataset)?;
-    let dataset = candidate.delivered(dataset);
+    model.of(dataset)?;
+    let dataset = model.delivered(dataset);
     let names = compile::names(model);
     let known = &names[..model.known_count()];
     let of_name = |name: &String| {
@@ -309,7 +310,7 @@ fn supply(model: &Model<'_>, touched: &ObjectTouches, seed: u64) -> Pools {
     let pool = |(turn, pool): (u64, &Pool)| {
         let mut touches: Vec<&Touch> = evidence(model, touched.of_pool(pool).iter()).collect();
         if !is_once {
-            follow::shuffle(&mut touches, &touched.name, seed, turn);
+            Drawer { purpose: Purpose::Misfit, name: &touched.name, seed }.shuffle(turn, &mut touches);
         }
         margins_of_touches(model, &touches)
     };

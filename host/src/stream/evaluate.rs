@@ -6,7 +6,7 @@ use crate::compile;
 use crate::error::Result;
 use crate::evaluate::Finding;
 use crate::evaluate::promise::at_least;
-use crate::evidence::{self, Chip, Given, Outcome, Totals, Unit, chip, outcome};
+use crate::evidence::{self, Chip, Given, Outcome, Totals, Unit, best, chip, outcome};
 use palpate_onboard::{Model, Recognizer, Stopping};
 use palpate_shared::format::{Per, Promise};
 use palpate_trees::rows::{RowSequence, Sequences};
@@ -294,8 +294,8 @@ impl Run<'_> {
                     if let Some(row) = sequence.rows.clone().nth(count - 1).map(|row| self.rows.row(row)) {
                         follower.push(row);
                         by_evidence = follower.leader();
-                        votes[largest(&row[..self.model.known_count()])] += 1;
-                        by_vote = largest(&votes);
+                        votes[best(&row[..self.model.known_count()])] += 1;
+                        by_vote = best(&votes);
                         used = count;
                     }
                     let of = &mut wrong[count - 1];
@@ -342,11 +342,6 @@ impl Run<'_> {
             order.iter().filter(|&&other| ends[other].touches > end.touches).count() as f64 / order.len() as f64;
         Some(Grown { class: sequence.class, posteriors, ended, longer: Some(longer).filter(|share| share.is_finite()) })
     }
-}
-
-/// The position of the largest number, the first of several.
-fn largest<N: PartialOrd>(numbers: &[N]) -> usize {
-    (1..numbers.len()).fold(0, |best, other| if numbers[other] > numbers[best] { other } else { best })
 }
 
 /// Numbers of rows to compare: all up to the longest sequence or the limit, or [`MOST_POINTS`] of them.

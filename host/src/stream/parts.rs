@@ -3,7 +3,8 @@
 use super::settings::Settings;
 use crate::calibrate::{Stop, at_best, needed, share_tested};
 use crate::error::{Error, Result};
-use crate::random::{self, Purpose};
+use crate::evidence::Drawer;
+use crate::random::Purpose;
 use palpate_trees::rows::RowSequence;
 use rand::seq::SliceRandom;
 use std::collections::BTreeSet;
@@ -25,7 +26,7 @@ pub(super) struct Parts<'s> {
 impl<'s> Parts<'s> {
     pub(super) fn new(sequences: &'s [RowSequence], settings: &Settings) -> Result<Self> {
         let mut all: Vec<&RowSequence> = sequences.iter().collect();
-        let mut random = random::generator(settings.seed, Purpose::Calibration, "sequences", 0);
+        let mut random = drawer(settings).random(0);
         all.shuffle(&mut random);
         let has_groups = all.iter().any(|sequence| sequence.group.is_some());
         let mut order: Vec<usize> = if has_groups {
@@ -70,7 +71,7 @@ impl<'s> Parts<'s> {
     /// All sequences tested, and others learned from.
     pub(super) fn of(learned: &'s [RowSequence], tested: &'s [RowSequence], settings: &Settings) -> Result<Self> {
         let mut all: Vec<&RowSequence> = tested.iter().collect();
-        all.shuffle(&mut random::generator(settings.seed, Purpose::Calibration, "sequences", 0));
+        drawer(settings).shuffle(0, &mut all);
         let parts = Self {
             learned: learned.iter().collect(),
             has_groups: all.iter().any(|sequence| sequence.group.is_some()),
@@ -150,6 +151,10 @@ impl<'s> Parts<'s> {
         let mut seen = BTreeSet::new();
         sequences.iter().copied().filter(|sequence| sequence.group.is_none_or(|group| seen.insert(group))).collect()
     }
+}
+
+fn drawer(settings: &Settings) -> Drawer<'static> {
+    Drawer { purpose: Purpose::Calibration, name: "sequences", seed: settings.seed }
 }
 
 pub(super) fn what(groups: bool) -> &'static str {

@@ -4,7 +4,7 @@ use super::Rows;
 use crate::calibrate::{Gain, Lead, Odds, Sequence, odds_of};
 use crate::compile::{Restated, restate};
 use crate::error::Result;
-use crate::evidence::totals;
+use crate::evidence::{best, totals};
 #[cfg(feature = "train")]
 use crate::strangers;
 use palpate_onboard::Model;
@@ -306,7 +306,7 @@ fn followed(rows: &Rows<'_>, sequences: &[&RowSequence], shape: &Shape, max_rows
                 .and_then(|weights| weights.get(Weights::position(count)).or(weights.last()).copied());
             let weight = weight.unwrap_or(1.0);
             let known = sums.get(..rows.known).unwrap_or(sums);
-            let best = (1..known.len()).fold(0, |best, other| if known[other] > known[best] { other } else { best });
+            let best = best(known);
             let others = sums.iter().enumerate().filter(|(object, _)| *object != best);
             let others: f64 = others.map(|(_, sum)| (weight * (sum - sums[best])).exp()).sum();
             let odds = odds_of(-others.ln());

@@ -8,8 +8,8 @@
 //! are divided in three, and each third's groups are counted with constants from the other two thirds. The constant that
 //! goes into the ensemble is from all groups, and so a little better than those of the figures.
 
-use crate::evaluate::best;
-use crate::random::{self, Purpose};
+use crate::evidence::{Drawer, best};
+use crate::random::Purpose;
 use rand::seq::SliceRandom;
 use rayon::prelude::*;
 
@@ -64,12 +64,12 @@ impl Groups {
     ) -> Self {
         let of = held.iter().zip(sources).enumerate().map(|(object, (held, sources))| {
             let name = format!("{object}");
+            let drawer = Drawer { purpose: Purpose::Teach, name: &name, seed };
             let group = |group: usize| {
-                let mut random = random::generator(seed, Purpose::Teach, &name, group as u64);
                 let own = &sources[group % sources.len()];
-                let drawn = rand::seq::index::sample(&mut random, own.len(), approaches.min(own.len()));
+                let drawn = drawer.some(group as u64, own.len(), approaches.min(own.len()));
                 let (mut sums, mut touches) = (Vec::new(), 0.0);
-                for margins in drawn.into_iter().filter_map(|drawn| held[own[drawn]].as_ref()) {
+                for margins in drawn.filter_map(|drawn| held[own[drawn]].as_ref()) {
                     sums.resize(margins.len(), 0.0);
                     sums.iter_mut().zip(margins).for_each(|(sum, margin): (&mut f64, _)| *sum += margin);
                     touches += 1.0;
@@ -156,7 +156,7 @@ impl Judged {
         seed: u64,
     ) -> Self {
         let shuffled = |(object, sources): (usize, &Vec<Vec<usize>>)| -> Vec<Vec<usize>> {
-            let mut random = random::generator(seed, Purpose::Teach, &format!("{object}"), u64::MAX - 1);
+            let mut random = Drawer { purpose: Purpose::Teach, name: &format!("{object}"), seed }.random(u64::MAX - 1);
             let mut sources = sources.clone();
             sources.iter_mut().for_each(|approaches| approaches.shuffle(&mut random));
             sources

@@ -1,9 +1,8 @@
 //! Check that objects can be taught to an ensemble.
 
 use super::{LEAST, Settings};
-use crate::ensemble::{Ensemble, Output, OverTouches, StatedProbe, TouchOrigin};
+use crate::ensemble::{Ensemble, Output, OverTouches, StatedProbe, TouchOrigin, object_of};
 use crate::error::{Error, Result, problem};
-use crate::evaluate::{Candidate, OfTouches};
 use crate::mesh::BACKGROUND;
 use crate::probe::noise::Noise;
 use crate::touches::{Dataset, ObjectTouches};
@@ -19,7 +18,11 @@ pub(super) fn check(
 ) -> Result<Descriptor> {
     let descriptor = of_vectors(ensemble, settings)?;
     none_missing(ensemble, known)?;
-    let is_known = |object: &&ObjectTouches| !Candidate::Full(ensemble).outputs_of(&object.name).is_empty();
+    let has_placements = TouchOrigin::of(&ensemble.origin)?.outputs(&ensemble.objects).is_some();
+    let is_known = |object: &&ObjectTouches| {
+        let mut known = ensemble.objects.iter().take(ensemble.known_count());
+        known.any(|known| *known == object.name || has_placements && object_of(known) == object.name)
+    };
     if let Some(object) = recorded.objects.iter().find(is_known) {
         return Err(is_known_already(&object.name));
     }

@@ -6,13 +6,13 @@ use super::column::{Part, fit};
 use super::rows::{Leaves, Rows, log_sum};
 use crate::ensemble::Ensemble;
 use crate::error::Result;
+use crate::evidence::Drawer;
 use crate::in_order::in_order;
 use crate::probe::noise::Noise;
 use crate::progress::{self, Progress};
-use crate::random::{self, Purpose};
+use crate::random::Purpose;
 use crate::with;
 use palpate_shared::{Descriptor, Touch};
-use rand::seq::SliceRandom;
 use rayon::prelude::*;
 
 /// Copies of recorded touches under jitter, for each object and all of its touches together.
@@ -77,7 +77,7 @@ pub(super) fn repeated(name: &str, touches: &[Touch], factor: f64, seed: u64) ->
 /// For each of `count` touches of an object its place in a random order, over their number.
 pub(super) fn places(name: &str, count: usize, seed: u64) -> Vec<f64> {
     let mut places: Vec<f64> = (0..count).map(|place| place as f64 / count as f64).collect();
-    places.shuffle(&mut random::generator(seed, Purpose::Teach, name, u64::MAX));
+    Drawer { purpose: Purpose::Teach, name, seed }.shuffle(u64::MAX, &mut places);
     places
 }
 

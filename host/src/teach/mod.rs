@@ -22,9 +22,9 @@ pub use alone::alone;
 pub use held_out::jitter;
 
 use crate::ensemble::train::{BASE_MARGIN, round_leaves};
-use crate::ensemble::{Ensemble, Node, TouchOrigin, train};
+use crate::ensemble::{Ensemble, Node, OverTouches, TouchOrigin, train};
 use crate::error::Result;
-use crate::evaluate::{Candidate, OfTouches, ROBOTS};
+use crate::evaluate::ROBOTS;
 use crate::in_order::in_order;
 use crate::probe::noise::Noise;
 use crate::progress::Progress;
@@ -146,7 +146,8 @@ pub fn teach(
     let shares = recorded.placement_shares();
     let recorded = &**placed;
     let descriptor = check::check(ensemble, known, recorded, settings)?;
-    let delivered = Candidate::Full(ensemble).delivered(recorded);
+    let (stated, window) = (TouchOrigin::of(&ensemble.origin)?.probe, ensemble.trained_touches().largest_spread);
+    let delivered = recorded.within(stated.and_then(|stated| stated.probe.stroke).map(|_| window));
     let recorded = delivered.as_ref();
     let noise = settings.noise.map_or_else(|| check::missing_noise(ensemble, known), Ok)?;
     on_threads(settings.threads, || {

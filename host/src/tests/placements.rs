@@ -5,7 +5,7 @@ use crate::capture::{self, Settings};
 use crate::compile::{self, CompiledModel, compile};
 use crate::ensemble::train::{self, Outputs, train};
 use crate::ensemble::{Ensemble, StatedProbe, TouchOrigin};
-use crate::evaluate::{Candidate, Margins, SequentialSettings, parity};
+use crate::evaluate::{Margins, SequentialSettings, parity};
 use crate::mesh::{Mesh, Object};
 use crate::teach;
 use crate::touches::{Dataset, ObjectTouches, Origin, Recorded, Source, Surroundings};
@@ -62,7 +62,7 @@ fn outputs_are_placements_of_objects_with_their_weights_as_priors() {
 }
 
 #[test]
-fn touches_of_another_scene_are_refused_by_ensembles_and_models() {
+fn touches_of_another_scene_are_refused() {
     let ensemble = trained(Outputs::Objects);
     let compiled = compiled(&ensemble);
     let model = compiled.model();
@@ -72,14 +72,12 @@ fn touches_of_another_scene_are_refused_by_ensembles_and_models() {
         (Surroundings::Table { cone: 30.0 }, "and table with approaches within 30 degrees of straight down"),
     ] {
         let other = in_scene(scene, 3, 200);
-        for candidate in [Candidate::Full(&ensemble), Candidate::Compiled(&model)] {
-            let refused = Margins::new(candidate, &other).err().expect("refused").to_string();
-            assert!(refused.contains(expected), "{refused}");
-        }
+        let refused = Margins::new(&model, &other).err().expect("refused").to_string();
+        assert!(refused.contains(expected), "{refused}");
         let refused = calibrate(&model, other, &calibrate::Settings::default(), &()).unwrap_err().to_string();
         assert!(refused.contains(expected), "{refused}");
     }
-    assert!(Margins::new(Candidate::Compiled(&model), &touched(3, 200)).is_ok());
+    assert!(Margins::new(&model, &touched(3, 200)).is_ok());
 }
 
 #[test]
@@ -90,13 +88,10 @@ fn names_are_of_objects_and_placements_are_named_beside_them() {
     let tested = touched(3, 20_000);
     let by_output = tested.clone().matching(&compiled.names());
     let settings = SequentialSettings { error_rate: Some(0.01), max_touches: Some(200), sequences: 300, seed: 1 };
-    let full = Margins::new(Candidate::Full(&ensemble), &by_output).unwrap().sequential(&settings).unwrap();
-    let onboard = Margins::new(Candidate::Compiled(&model), &by_output).unwrap().sequential(&settings).unwrap();
-    for found in [&full, &onboard] {
-        assert!(found.error < 0.05 && found.undecided < 0.5, "{found:?}");
-        let placement = found.placement.unwrap();
-        assert!(placement > 0.4, "{placement}");
-    }
+    let found = Margins::new(&model, &by_output).unwrap().sequential(&settings).unwrap();
+    assert!(found.error < 0.05 && found.undecided < 0.5, "{found:?}");
+    let placement = found.placement.unwrap();
+    assert!(placement > 0.4, "{placement}");
     let parity = parity::parity(&ensemble, &model, &by_output, 300, 1, &()).unwrap();
     assert_eq!((parity.verdict_differs, parity.touches_differ), (0, 0));
     // A model of objects takes the same touches as they are.
@@ -116,7 +111,7 @@ fn a_promise_of_each_placement_is_kept_on_fresh_touches_whatever_their_shares() 
     let calibrated = calibrate(&model, dataset, &settings(Per::Object), &()).unwrap();
     let kept = compile::open(&calibrated.model).unwrap();
     let fresh = touched(4, 60_000).matching(&compiled.names());
-    let margins = Margins::new(Candidate::Compiled(&kept), &fresh).unwrap();
+    let margins = Margins::new(&kept, &fresh).unwrap();
     let settings = SequentialSettings { error_rate: None, max_touches: None, sequences: 2_000, seed: 1 };
     let found = margins.sequential(&settings).unwrap();
     for (placement, wrong) in &found.error_of_given_per_object {
@@ -188,30 +183,24 @@ fn recordings_of_an_object_are_of_all_of_its_placements_unless_they_state_one() 
         let recorded = recorded(&tested, is_stated).matching(&compiled.names());
         let expected = if is_stated { compiled.names() } else { vec!["brick".into(), "disc".into(), "rod".into()] };
         assert_eq!(recorded.names(), expected);
-        for candidate in [Candidate::Full(&ensemble), Candidate::Compiled(&model)] {
-            let margins = Margins::new(candidate, &recorded).unwrap();
-            let found = margins.sequential(&settings).unwrap();
-            assert!(found.error < 0.05 && found.undecided < 0.5, "{found:?}");
-            // Which placement was touched is known of those that state it.
-            assert_eq!(found.placement.is_some(), is_stated);
-            let all: f64 = (0..expected.len()).map(|position| margins.frequency(position)).sum();
-            let known: f64 = match candidate {
-                Candidate::Full(_) => 3.0,
-                Candidate::Compiled(model) => (0..compiled.names().len())
-                    .map(|output| (f64::from(model.prior(output)) * f64::from(model.unit())).exp())
-                    .sum(),
-            };
-            assert!((all / known - 1.0).abs() < 1e-3, "{all} {known}");
-            // Named is what the model says, not what stands for the object.
-            let confusion = margins.confusion(20, 200, 1).unwrap();
-            let brick = confusion[0].iter().filter(|count| **count > 0).count();
-            assert!(is_stated || brick > 1, "{confusion:?}");
-        }
+        let margins = Margins::new(&model, &recorded).unwrap();
+        let found = margins.sequential(&settings).unwrap();
+        assert!(found.error < 0.05 && found.undecided < 0.5, "{found:?}");
+        // Which placement was touched is known of those that state it.
+        assert_eq!(found.placement.is_some(), is_stated);
+        let all: f64 = (0..expected.len()).map(|position| margins.frequency(position)).sum();
+        let prior = |output| (f64::from(model.prior(output)) * f64::from(model.unit())).exp();
+        let known: f64 = (0..compiled.names().len()).map(prior).sum();
+        assert!((all / known - 1.0).abs() < 1e-3, "{all} {known}");
+        // Named is what the model says, not what stands for the object.
+        let confusion = margins.confusion(20, 200, 1).unwrap();
+        let brick = confusion[0].iter().filter(|count| **count > 0).count();
+        assert!(is_stated || brick > 1, "{confusion:?}");
     }
     // Each object expected or not, whatever its placement.
     let recorded = recorded(&tested, false);
     let only = |weights: Vec<u32>| {
-        let margins = Margins::new(Candidate::Compiled(&model), &recorded).unwrap().expecting(weights).unwrap();
+        let margins = Margins::new(&model, &recorded).unwrap().expecting(weights).unwrap();
         margins.tested_names.clone()
     };
     let of = |object: &str| compiled.names().iter().map(|name| u32::from(name.starts_with(object))).collect();
@@ -227,14 +216,14 @@ fn a_placement_that_the_model_does_not_know_is_named_with_those_that_it_does() {
     let Source::Recording(lying) = lying else { panic!("{lying:?}") };
     let other = Recorded { placement: Some("+q".into()), ..lying };
     tested.objects[0] = ObjectTouches::new("brick", tested.objects[0].touches().to_vec(), Source::Recording(other));
-    let error = Margins::new(Candidate::Compiled(&model), &tested.matching(&compiled.names())).err().unwrap();
+    let error = Margins::new(&model, &tested.matching(&compiled.names())).err().unwrap();
     let text = error.to_string();
     assert!(text.contains("does not know the object brick/+q, only brick/") && !text.contains("rod"), "{text}");
     assert!(text.contains("--object OBJECT"), "{text}");
     // Of an object that it does not know at all, the objects.
     let mut unknown = recorded(&touched(3, 600), false);
     unknown.objects[2] = unknown.objects[2].clone().renamed("vase");
-    let error = Margins::new(Candidate::Compiled(&model), &unknown).err().unwrap().to_string();
+    let error = Margins::new(&model, &unknown).err().unwrap().to_string();
     assert!(error.contains("the object vase, only brick, disc, rod."), "{error}");
 }
 
@@ -243,7 +232,7 @@ fn an_object_that_is_known_in_any_placement_is_no_stranger() {
     let compiled = compiled(&trained(Outputs::Placements));
     let model = compiled.model();
     let strangers = touched(3, 600).only(|name| name == "rod");
-    let refused = Margins::of_strangers(Candidate::Compiled(&model), &strangers).err().unwrap();
+    let refused = Margins::of_strangers(&model, &strangers).err().unwrap();
     assert_eq!(refused.what(), "the model knows the object rod, so it is not a stranger");
 }
 
@@ -258,12 +247,11 @@ fn recordings_that_state_placements_are_refused_by_models_of_floating_objects() 
     };
     let ensemble = train(&dataset, &recipe, &()).unwrap();
     let touched = touched(3, 600);
-    let error = Margins::new(Candidate::Full(&ensemble), &recorded(&touched, true)).err().unwrap();
+    let compiled = compile::exact(&ensemble).unwrap();
+    let model = compiled.model();
+    let error = Margins::new(&model, &recorded(&touched, true)).err().unwrap();
     assert!(error.to_string().contains("state different probes: scene floating and table"), "{error}");
-    assert!(
-        Margins::new(Candidate::Full(&ensemble), &recorded(&touched, false)).is_ok(),
-        "nothing says where they are from"
-    );
+    assert!(Margins::new(&model, &recorded(&touched, false)).is_ok(), "nothing says where they are from");
 }
 
 #[test]

@@ -1,5 +1,5 @@
 use crate::fixtures::*;
-use palpate::compile::{Instructions, Leaf, Settings, compile, longest_time, open, usual};
+use palpate::compile::{Instructions, Leaf, Settings, compile, exact, longest_time, open, read_any, usual};
 use palpate::ensemble::inputs;
 
 fn split(feature: usize, threshold: f32, left: usize, right: usize) -> Node {
@@ -110,4 +110,39 @@ fn the_longest_time_is_that_of_ten_units_or_follows_larger_thresholds() {
     };
     assert!((longest(500_000.0) - (10.0 * 3.0_f64.sqrt() + 3.0) / 10.0).abs() < 1e-9);
     assert!((longest(-16_000_000.0) - 64.0).abs() < 1e-9, "{}", longest(-16_000_000.0));
+}
+
+#[test]
+fn models_and_ensembles_are_read_as_models_and_anything_else_is_refused_by_name() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = |name: &str| directory.path().join(name);
+    let ensemble = stump(20_000.0, [[0.123_456_7, -0.5], [-0.5, 0.5]]);
+    ensemble.save(path("ensemble.json")).unwrap();
+    let compiled = compile(&ensemble, &Settings::default()).unwrap();
+    std::fs::write(path("model"), &compiled.bytes).unwrap();
+    assert_eq!(read_any(path("model")).unwrap().bytes(), compiled.bytes);
+    let read = read_any(path("ensemble.json")).unwrap();
+    assert_eq!(read.bytes(), exact(&ensemble).unwrap().bytes());
+    assert_eq!((read.model().leaf_type(), read.path()), (Leaf::F32, Some(&*path("ensemble.json"))));
+    std::fs::write(path("truncated"), &compiled.bytes[..compiled.bytes.len() - 1]).unwrap();
+    std::fs::write(path("empty"), b"").unwrap();
+    // More thresholds than a model can have: it is an ensemble, and no model.
+    let many = (0..66).map(|tree| chain(1_000, |_| 0).into_iter().map(move |node| shifted(node, tree)).collect());
+    self::ensemble(Descriptor::Curvature, many.collect()).save(path("large")).unwrap();
+    for bad in ["truncated", "empty", "missing", "large"] {
+        let error = read_any(path(bad)).err().unwrap();
+        assert!(error.to_string().contains(bad) && error.exit_code() == 1, "{error}");
+    }
+    let error = read_any(path("large")).unwrap_err();
+    assert_eq!(error.what(), "the ensemble has 66000 different thresholds, and a model can have 65,536");
+}
+
+/// A split at a threshold that no other tree's chain has.
+fn shifted(node: Node, tree: usize) -> Node {
+    match node {
+        Node::Split { feature, threshold, missing_left, left, right } => {
+            Node::Split { feature, threshold: threshold + tree as f32, missing_left, left, right }
+        }
+        leaf @ Node::Leaf(_) => leaf,
+    }
 }

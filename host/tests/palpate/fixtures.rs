@@ -6,7 +6,7 @@ pub(crate) use palpate::ensemble::{
     Ensemble, Inputs, Node, Output, OverTouches, Provenance, StatedProbe, TouchOrigin, Tree,
 };
 pub(crate) use palpate::error::Kind;
-pub(crate) use palpate::evaluate::{Candidate, Margins, SequentialSettings};
+pub(crate) use palpate::evaluate::{Margins, SequentialSettings};
 pub(crate) use palpate::mesh::{Mesh, Object};
 pub(crate) use palpate::onboard::{Model, Recognizer, Stopping, Verdict};
 pub(crate) use palpate::probe::approach::Probe;

@@ -47,6 +47,8 @@ fn recipe() -> train::Settings {
 
 static ENSEMBLE: LazyLock<Ensemble> = LazyLock::new(|| train(&touches(4_000, 1), &recipe(), &()).unwrap());
 
+static EXACT: LazyLock<CompiledModel> = LazyLock::new(|| compile::exact(&ENSEMBLE).unwrap());
+
 static MODEL: LazyLock<CompiledModel> = LazyLock::new(|| {
     let bytes = compile(&ENSEMBLE, &compile::Settings::default()).unwrap().bytes;
     CompiledModel::from_bytes(bytes).unwrap()
@@ -55,9 +57,9 @@ static MODEL: LazyLock<CompiledModel> = LazyLock::new(|| {
 /// Touches that nothing was trained, chosen or calibrated on.
 static FRESH: LazyLock<Dataset> = LazyLock::new(|| touches(20_000, 77));
 
-/// Results of a candidate on touches of `dataset`: its accuracy after ten, and wrong and unknown ends of its sequences.
-fn measured(candidate: Candidate<'_>, dataset: &Dataset) -> [Share; 3] {
-    let margins = Margins::new(candidate, dataset).unwrap();
+/// Results of a model on touches of `dataset`: its accuracy after ten, and wrong and unknown ends of its sequences.
+fn measured(model: &Model<'_>, dataset: &Dataset) -> [Share; 3] {
+    let margins = Margins::new(model, dataset).unwrap();
     let settings = with!(evaluate::Settings::default(), at = vec![10], at_approaches = vec![10]);
     figures(&evaluate::evaluate(&margins, &settings).unwrap(), dataset)
 }
@@ -153,7 +155,7 @@ fn promises_are_kept_where_objects_have_several_meshes() {
 /// The share of fresh sequences that end as unknown, and that of wrong names among those given.
 fn ends(model: &[u8]) -> [f64; 2] {
     let model = compile::open(model).unwrap();
-    let margins = Margins::new(Candidate::Compiled(&model), &FRESH).unwrap();
+    let margins = Margins::new(&model, &FRESH).unwrap();
     let settings = SequentialSettings { error_rate: None, max_touches: None, sequences: 1_000, seed: 3 };
     let Sequential { unknown, error, undecided, .. } = margins.sequential(&settings).unwrap();
     [unknown, error / (1.0 - unknown - undecided)]
@@ -167,8 +169,8 @@ fn a_promise_would_be_broken_by_touches_that_forgot_their_meshes() {
     assert!(wrong > 1.4 * RATE, "the meshes are too much alike to show anything: {wrong}");
     // And what is measured on them is not what a robot meets.
     let model = compile::open(&average.model).unwrap();
-    let [mixed, ..] = measured(Candidate::Compiled(&model), &forgotten(&FRESH));
-    let [fresh, ..] = measured(Candidate::Compiled(&model), &FRESH);
+    let [mixed, ..] = measured(&model, &forgotten(&FRESH));
+    let [fresh, ..] = measured(&model, &FRESH);
     assert!(mixed.0 > fresh.0 + 0.03, "{mixed:?} {fresh:?}");
 }
 
@@ -189,32 +191,34 @@ fn what_calibrations_count_is_what_fresh_touches_give() {
 #[test]
 fn figures_of_a_part_of_the_touches_are_those_of_fresh_ones() {
     // As evaluate, Python's calls and the report's cross-validation state them: on a part that was held out.
-    let candidate = Candidate::Full(&ENSEMBLE);
+    let model = &EXACT.model();
     let all = touches(6_000, 5);
     let test = folds::split(&all, 0.3, 1).unwrap().test;
-    let fresh = measured(candidate, &FRESH);
-    agree("split", measured(candidate, &test), fresh);
-    agree("fold", measured(candidate, &folds::fold(&all, 1, 4, 1).unwrap().test), fresh);
+    let fresh = measured(model, &FRESH);
+    agree("split", measured(model, &test), fresh);
+    agree("fold", measured(model, &folds::fold(&all, 1, 4, 1).unwrap().test), fresh);
     // A copy on the disk is as good.
     let directory = tempfile::tempdir().unwrap();
     let origin = palpate::touches::Origin { approaches: true, ..Default::default() };
     let stated = Dataset { origin: Some(origin), ..test };
     stated.write(directory.path(), None).unwrap();
-    agree("a copy", measured(candidate, &Dataset::read(directory.path()).unwrap()), fresh);
+    agree("a copy", measured(model, &Dataset::read(directory.path()).unwrap()), fresh);
     // With noise too, whose robots differ.
     let noise = with!(Noise::gaussian(5_000.0), speed_bias = 0.1);
     let [mut noisy, mut other] = [stated, FRESH.clone()];
     evaluate::add_noise(&mut noisy, &noise, 1).unwrap();
     evaluate::add_noise(&mut other, &noise, 2).unwrap();
     // Each robot has a bias of its own: the cases are robots of each instance, not sequences.
-    let [stated, ..] = measured(candidate, &noisy);
-    let [measured, ..] = measured(candidate, &other);
+    let [stated, ..] = measured(model, &noisy);
+    let [measured, ..] = measured(model, &other);
     Share(stated.0, 0.04).agrees("with noise, accuracy", Share(measured.0, 0.02));
 }
 
 /// An object's figures in a group of `approaches` approaches, and on fresh touches.
 fn taught_agrees(what: &str, ensemble: &Ensemble, taught: &teach::Taught) {
-    let margins = Margins::new(Candidate::Full(ensemble), &FRESH).unwrap();
+    let compiled = compile::exact(ensemble).unwrap();
+    let model = compiled.model();
+    let margins = Margins::new(&model, &FRESH).unwrap();
     let sequences = SequentialSettings { error_rate: None, max_touches: None, sequences: 1_000, seed: 9 };
     let fresh = margins.approaches(&[taught.approaches], &sequences).unwrap();
     for object in &taught.objects {

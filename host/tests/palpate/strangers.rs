@@ -45,7 +45,7 @@ fn measured(model: &Model<'_>, known: &Dataset, unknown: &Dataset) -> Result<Eva
         active: false,
         unknown: Some((Path::new("strangers"), unknown)),
     };
-    measure(Candidate::Compiled(model), known, &wanted, |_, _| Ok(None))
+    measure(model, known, &wanted, |_, _| Ok(None))
 }
 
 #[test]

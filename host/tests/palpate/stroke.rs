@@ -44,7 +44,8 @@ fn model(stroke: Option<f64>) -> Ensemble {
 }
 
 fn verdict(model: &Ensemble, dataset: &Dataset) -> palpate::Result<()> {
-    Margins::new(Candidate::Full(model), dataset).map(|_| ())
+    let compiled = compile::exact(model)?;
+    Margins::new(&compiled.model(), dataset).map(|_| ())
 }
 
 #[test]
@@ -86,13 +87,14 @@ fn touches_of_the_models_stroke_are_taken_and_of_another_refused_with_both_value
 
 #[test]
 fn a_recorded_contact_a_little_after_the_stroke_is_missing_as_on_the_chip() {
-    let limited = model(Some(2.0));
+    let limited = compile::exact(&model(Some(2.0))).unwrap();
+    let limited = limited.model();
     let late = lines(&captured(Some(2.0), 2))
         .each(|own| changed(own, |touch| if touch.spread() > 190_000 { stretched(touch) } else { *touch }));
     assert!(late.touches().any(|touch| touch.spread() > 200_000));
     let cut = late.each(|own| changed(own, |touch| hand::within(touch, Some(200_000))));
     let accuracy = |dataset: &Dataset| {
-        let margins = Margins::new(Candidate::Full(&limited), dataset).unwrap();
+        let margins = Margins::new(&limited, dataset).unwrap();
         margins.confusion(5, 500, 1).unwrap()
     };
     assert_eq!(accuracy(&late), accuracy(&cut));
@@ -125,15 +127,13 @@ fn a_contact_later_than_an_estimated_stroke_by_less_than_it_is_known_to_is_late_
     let of_hand = |stroke: f64| lines(&captured(Some(stroke), 2));
     let (same, other) = (of_hand(2.25), of_hand(2.35));
     assert!(same.touches().any(|touch| touch.spread() > 220_000));
-    for candidate in [Candidate::Full(&ensemble), Candidate::Compiled(&model)] {
-        assert!(Margins::new(candidate, &same).is_ok());
-        let refused = Margins::new(candidate, &other).err().unwrap().to_string();
-        assert!(refused.contains("a stroke of 2 (0.200 s), which explains contacts up to 0.230 s"), "{refused}");
-    }
+    assert!(Margins::new(&model, &same).is_ok());
+    let refused = Margins::new(&model, &other).err().unwrap().to_string();
+    assert!(refused.contains("a stroke of 2 (0.200 s), which explains contacts up to 0.230 s"), "{refused}");
     // Whoever looks at them, late contacts are missing: margins, sequences, a test for strangers, and a line at a time.
     let cut = same.each(|own| changed(own, |touch| hand::within(touch, Some(200_000))));
     let accuracy = |dataset: &Dataset| {
-        let margins = Margins::new(Candidate::Compiled(&model), dataset).unwrap();
+        let margins = Margins::new(&model, dataset).unwrap();
         margins.confusion(5, 500, 1).unwrap()
     };
     assert_eq!(accuracy(&same), accuracy(&cut));

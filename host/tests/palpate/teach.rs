@@ -18,7 +18,9 @@ fn a_taught_object_is_recognized_and_the_others_still_are() {
     let [known, recorded, unseen] = to_teach(300);
     let ensemble = &*TRAINED;
     let (extended, taught) = teach(ensemble, &known, &recorded, &few_groups(), &()).unwrap();
-    let figures = Margins::new(Candidate::Full(&extended), &unseen).unwrap();
+    let compiled = compile::exact(&extended).unwrap();
+    let model = compiled.model();
+    let figures = Margins::new(&model, &unseen).unwrap();
     let curve = figures.curve(30, 400, 1).unwrap();
     for (object, least) in [(0, 0.9), (1, 0.8), (2, 0.9)] {
         let accuracy = curve.object_accuracy(object, 30).value;
@@ -150,7 +152,9 @@ fn recorded_touches_alone_make_an_ensemble_that_states_them() {
     let recorded = synthetic::dataset(&[150, 150], 1);
     let unseen = synthetic::dataset(&[2_000, 2_000], 2);
     let (ensemble, taught) = alone(&recorded, &few_trees(), &few_groups(), &()).unwrap();
-    let margins = Margins::new(Candidate::Full(&ensemble), &unseen).unwrap();
+    let compiled = compile::exact(&ensemble).unwrap();
+    let model = compiled.model();
+    let margins = Margins::new(&model, &unseen).unwrap();
     let accuracy = margins.curve(20, 300, 1).unwrap().accuracy(20).value;
     assert!(accuracy > 0.85, "{accuracy}");
     let bytes = compile(&ensemble, &compile::Settings::default()).unwrap().bytes;

@@ -14,7 +14,7 @@ use palpate::ensemble::Ensemble;
 use palpate::ensemble::train::{self, train};
 use palpate::error::Result;
 use palpate::evaluate::{
-    Candidate, Margins, parity,
+    Margins, parity,
     together::{Together, TouchesTogether},
 };
 use palpate::mesh::{obj, source};
@@ -122,7 +122,7 @@ fn models(rounds: usize, models: &[(String, &Ensemble, Compiled)], test: &Datase
             compiled.bytes.len()
         );
         let off = parity::difference(ensemble, model, &touches, &())?.max_margin_error;
-        let margins = Margins::new(Candidate::Compiled(model), test)?;
+        let margins = Margins::new(model, test)?;
         let at_10 = margins.curve(10.min(margins.fewest_touches()), 5_000, 1)?.accuracy(10).value;
         row(name, &speed, &format!("margins off by {off:.0e} nats; {:.2} % right after 10 touches", 100.0 * at_10));
     }

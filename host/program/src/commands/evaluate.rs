@@ -7,8 +7,8 @@ use super::probe::ProbeArguments;
 use super::progress::Bar;
 use super::real::RealArguments;
 use palpate::Result;
-use palpate::ensemble::OverTouches;
-use palpate::evaluate::model_file::ModelFile;
+use palpate::compile::CompiledModel;
+use palpate::ensemble::compiled_trained_on;
 use palpate::evaluate::{self, Evaluated, Wanted};
 use palpate::probe::noise::Noise;
 use palpate::progress::Progress;
@@ -19,7 +19,7 @@ use std::path::PathBuf;
 /// Measure how often a model is right, and after how many touches.
 #[derive(clap::Args)]
 #[command(after_help = "\
-Evaluate on touches that the model was not trained on. A compiled model is evaluated by the code that runs on the chip, an ensemble in f32. A compiled model stops by its own thresholds; if it was calibrated, the figures show whether it keeps its promise. Wrong names are shares of all sequences, and of those that got a name. docs/reference/options.md explains every figure.
+Evaluate on touches that the model was not trained on. Models are evaluated by the code that runs on the chip; an ensemble is compiled first, with its own leaves. A model stops by its own thresholds, an ensemble at a posterior of 99 %; if it was calibrated, the figures show whether it keeps its promise. Wrong names are shares of all sequences, and of those that got a name. docs/reference/options.md explains every figure.
 
 Examples:
   palpate capture builtin -o unseen --approaches 6000 --seed 2
@@ -60,24 +60,20 @@ pub(crate) struct Arguments {
 }
 
 /// True if the pattern of touching fingers is evidence to the model.
-fn counts_patterns(file: &ModelFile) -> bool {
-    let counted = match file {
-        ModelFile::Full(ensemble) => ensemble.trained_touches().counted,
-        ModelFile::Compiled(compiled) => compiled.model().trained_touches().counted,
-    };
-    counted != Counted::Full
+fn counts_patterns(compiled: &CompiledModel) -> bool {
+    compiled.model().trained_touches().counted != Counted::Full
 }
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let directory = &arguments.directory;
-    let file = kinds::file(&arguments.model, ModelKind::Touches, "evaluate")?;
-    let mut dataset = super::checked(Dataset::read_any(directory)?).matching(&file.names());
+    let compiled = kinds::file(&arguments.model, ModelKind::Touches, "evaluate")?;
+    let mut dataset = super::checked(Dataset::read_any(directory)?).matching(&compiled.names());
     super::refuse_located(&dataset, directory)?;
     let touches = || dataset.touches();
-    if counts_patterns(&file) {
+    if counts_patterns(&compiled) {
         super::warn_of_full(touches().count(), touches().any(|touch| !touch.is_full()));
     }
-    let trained_on: Vec<String> = file.trained_on(&dataset).into_iter().map(String::from).collect();
+    let trained_on: Vec<String> = compiled_trained_on(&compiled, &dataset).into_iter().map(String::from).collect();
     let probe = arguments.probe.read()?;
     arguments.probe.of_dataset(probe.as_ref(), &dataset)?;
     let noise = arguments.real.over(arguments.probe.noise(probe.as_ref(), &dataset, Noise::default())?)?;
@@ -103,7 +99,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         unknown: unknown.as_ref().map(|(directory, dataset)| (*directory, dataset)),
     };
     let expecting = |objects: &[String], own: &[f64]| arguments.expected.weights(objects, own);
-    let measured = file.with(|candidate| evaluate::measure(candidate, &dataset, &wanted, expecting))?;
+    let measured = evaluate::measure(&compiled.model(), &dataset, &wanted, expecting)?;
     let evaluated = Evaluated { robots, trained_on, ..measured };
     drop(progress);
     global.print(&evaluated, || text(&evaluated))

@@ -1,8 +1,7 @@
 //! Kinds of models, and the commands that take them.
 
-use palpate::compile::CompiledModel;
+use palpate::compile::{self, CompiledModel};
 use palpate::error::{Error, Place, Result, problem};
-use palpate::evaluate::model_file::ModelFile;
 use palpate::locate::MapsFile;
 use std::path::Path;
 
@@ -40,13 +39,12 @@ pub(super) fn compiled(path: &Path, wanted: ModelKind, command: &str) -> Result<
     Ok(compiled)
 }
 
-/// Reads a compiled model or an ensemble for a command that takes those of one kind.
-pub(super) fn file(path: &Path, wanted: ModelKind, command: &str) -> Result<ModelFile> {
+/// Reads a compiled model, or an ensemble as its exact model, for a command that takes those of one kind.
+pub(super) fn file(path: &Path, wanted: ModelKind, command: &str) -> Result<CompiledModel> {
     refuse_maps(path, wanted, command)?;
-    let file = ModelFile::load(path)?;
-    let has_rows = file.with(|candidate| Ok(candidate.is_of_rows()))?;
-    check(path, of_trees(!has_rows), wanted, command)?;
-    Ok(file)
+    let compiled = compile::read_any(path)?;
+    check(path, of_trees(compiled.model().descriptor().is_some()), wanted, command)?;
+    Ok(compiled)
 }
 
 /// Reads a model of maps.

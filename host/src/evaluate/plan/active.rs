@@ -3,11 +3,10 @@
 use super::poses::{ByPose, Stock};
 use super::{check_approaches, no_plan};
 use crate::error::Result;
-use crate::evaluate::Candidate;
-use crate::evaluate::margins::{Margins, Tested, Values, row};
+use crate::evaluate::margins::{Margins, Tested, row};
 use crate::evidence::{Chip, Counted, Follower, Outcome, Supplier, chip, follow, outcome};
 use crate::touches::{Dataset, ObjectTouches};
-use palpate_onboard::{Model, Stopping};
+use palpate_onboard::Stopping;
 use palpate_shared::Poses;
 use serde::Serialize;
 use std::convert::Infallible;
@@ -44,16 +43,12 @@ impl Active {
     /// The approaches of a data set, which the margins are of, by the poses of the model's plan.
     ///
     /// # Errors
-    /// When there is no plan, such as in an ensemble; when the data set is without approaches or without poses.
+    /// When there is no plan; when the data set is without approaches or without poses.
     pub(crate) fn new(margins: &Margins<'_>, dataset: &Dataset) -> Result<Self> {
-        let plan = match margins.candidate {
-            Candidate::Full(_) => None,
-            Candidate::Compiled(model) => model.plan(),
-        };
-        let plan = plan.ok_or_else(no_plan)?;
+        let plan = margins.model.plan().ok_or_else(no_plan)?;
         check_approaches(dataset)?;
         let poses = plan.poses();
-        let turns = |(tested, object): (&Tested<'_>, &ObjectTouches)| -> Result<Vec<ByPose>> {
+        let turns = |(tested, object): (&Tested, &ObjectTouches)| -> Result<Vec<ByPose>> {
             tested.pools.iter().map(|pool| ByPose::new(object, poses, &pool.touches)).collect()
         };
         let by_pose: Vec<Vec<ByPose>> =
@@ -83,7 +78,7 @@ impl Active {
 
 impl Margins<'_> {
     /// Follows one sequence of a tested object under the plan's policy, until `see` says that it is enough or no approach
-    /// is left. A full model has no plan and no sequence.
+    /// is left.
     pub(super) fn follow_plan(
         &self,
         active: &Active,
@@ -91,9 +86,7 @@ impl Margins<'_> {
         (stopping, seed): (Stopping, u64),
         see: impl FnMut(&Chip<'_>, Counted) -> bool,
     ) {
-        if let Some((model, mut chosen)) = self.chosen(active, which, seed) {
-            let Ok(_) = follow(&mut chosen, &mut *chip(model, stopping, None), see);
-        }
+        let Ok(_) = follow(&mut self.chosen(active, which, seed), &mut *chip(self.model, stopping, None), see);
     }
 
     /// Outcome of a sequence of approaches under the plan's policy.
@@ -103,21 +96,14 @@ impl Margins<'_> {
         which: (usize, usize),
         (stopping, seed): (Stopping, u64),
     ) -> Outcome {
-        let Some((model, mut chosen)) = self.chosen(active, which, seed) else { return Outcome::default() };
-        let Ok(outcome) = outcome(&mut chosen, &mut *chip(model, stopping, None));
+        let Ok(outcome) = outcome(&mut self.chosen(active, which, seed), &mut *chip(self.model, stopping, None));
         outcome
     }
 
-    fn chosen<'c>(
-        &'c self,
-        active: &'c Active,
-        (position, group): (usize, usize),
-        seed: u64,
-    ) -> Option<(&'c Model<'c>, Chosen<'c>)> {
+    fn chosen<'c>(&'c self, active: &'c Active, (position, group): (usize, usize), seed: u64) -> Chosen<'c> {
         let tested = &self.tested[position];
-        let Values::Compiled(model, values) = &tested.values else { return None };
         let stock = active.stock(position, group, seed);
-        Some((model, Chosen { active, stock, approaches: &tested.approaches, values, objects: self.objects.len() }))
+        Chosen { active, stock, approaches: &tested.approaches, values: &tested.values, objects: self.objects.len() }
     }
 }
 

@@ -8,10 +8,9 @@ pub(super) use active::Active;
 pub use active::ActiveFacts;
 pub(super) use figures::evaluate_active;
 use poses::ByPose;
-pub(crate) use poses::no_pose_of;
+pub(crate) use poses::by_pose;
 
-use super::Candidate;
-use super::margins::{Margins, Values, row};
+use super::margins::{Margins, row};
 use crate::compile::{self, Restated, restate};
 use crate::error::{Error, Result, problem};
 use crate::touches::Dataset;
@@ -76,7 +75,7 @@ pub fn plan(model: &Model<'_>, dataset: &Dataset, rolls: u8) -> Result<Planned> 
             .fix("Train a model of two objects or more."));
     }
     check_approaches(dataset)?;
-    let margins = Margins::new(Candidate::Compiled(model), dataset)?;
+    let margins = Margins::new(model, dataset)?;
     let tested: Vec<usize> = (0..model.known_count())
         .map(|object| {
             let missing = || {
@@ -189,20 +188,19 @@ fn fewest(by_pose: &[ByPose], may_touch: &[bool]) -> Result<usize> {
 /// For each pose and each other object the mean of e^(−evidence/2) of an approach to a tested object.
 fn overlaps(margins: &Margins<'_>, position: usize, by_pose: &ByPose) -> Vec<f64> {
     let (tested, objects) = (&margins.tested[position], margins.objects.len());
+    let unit = f64::from(margins.model.unit());
     let mut overlaps = Vec::new();
     for approaches in &by_pose.approaches {
         let mut sums = vec![0.0; objects];
         for &approach in approaches {
-            let values = match (&tested.values, tested.approaches[approach as usize]) {
-                (Values::Compiled(_, values), Some(touch)) => &values[row(touch as usize, objects)],
-                _ => {
-                    sums.iter_mut().for_each(|sum| *sum += 1.0);
-                    continue;
-                }
+            let Some(touch) = tested.approaches[approach as usize] else {
+                sums.iter_mut().for_each(|sum| *sum += 1.0);
+                continue;
             };
+            let values = &tested.values[row(touch as usize, objects)];
             let own = values[tested.object];
             for (sum, &margin) in sums.iter_mut().zip(values) {
-                *sum += (f64::from(margin - own) * margins.unit() / 2.0).exp();
+                *sum += (f64::from(margin - own) * unit / 2.0).exp();
             }
         }
         overlaps.extend(sums.into_iter().map(|sum| sum / approaches.len().max(1) as f64));

@@ -1,10 +1,10 @@
 //! Approaches by the pose that they were made in, so that a robot can be sent where a plan says.
 
 use crate::error::{Error, Result, problem};
-use crate::evaluate::draws::Draws;
+use crate::evidence::{Drawer, Draws};
 use crate::random::Purpose;
 use crate::touches::ObjectTouches;
-use palpate_shared::Poses;
+use palpate_shared::{Poses, Touch};
 use std::collections::HashMap;
 
 /// The approaches of one object, or some of them, by the number of their pose.
@@ -22,14 +22,9 @@ impl ByPose {
     /// # Errors
     /// When a touch has no pose.
     pub(super) fn new(touched: &ObjectTouches, poses: Poses, approaches_of: &[u32]) -> Result<Self> {
-        let mut approaches = vec![Vec::new(); poses.count().into()];
         let touches =
             approaches_of.iter().filter_map(|&number| Some((number, touched.touches().get(number as usize)?)));
-        for (number, touch) in touches {
-            let pose = poses.number_of(&touch.pose().ok_or_else(|| no_pose_of(&touched.name))?);
-            approaches[usize::from(pose)].push(number);
-        }
-        Ok(Self { name: touched.name.clone(), approaches })
+        Ok(Self { name: touched.name.clone(), approaches: by_pose(&touched.name, touches, poses)? })
     }
 
     /// Number of approaches made in a pose; 0 for one that does not exist.
@@ -44,8 +39,25 @@ impl ByPose {
     }
 }
 
+/// The numbers of touches of an object, by the numbers of their poses.
+///
+/// # Errors
+/// When a touch has no pose.
+pub(crate) fn by_pose<'t>(
+    name: &str,
+    touches: impl Iterator<Item = (u32, &'t Touch)>,
+    poses: Poses,
+) -> Result<Vec<Vec<u32>>> {
+    let mut by_pose = vec![Vec::new(); poses.count().into()];
+    for (number, touch) in touches {
+        let pose = touch.pose().ok_or_else(|| no_pose_of(name))?;
+        by_pose[usize::from(poses.number_of(&pose))].push(number);
+    }
+    Ok(by_pose)
+}
+
 /// The problem of approaches to an object without the probe's pose, which a plan needs.
-pub(crate) fn no_pose_of(object: &str) -> Error {
+fn no_pose_of(object: &str) -> Error {
     problem!("there are approaches to {object} without the probe's pose")
         .fix("Capture the approaches with their pose: --approaches N --pose.")
 }
@@ -71,7 +83,8 @@ impl Stock<'_> {
         let approaches = self.of.approaches.get(usize::from(pose))?;
         // Each pose has its own stream, so that the order in which poses are asked for makes no difference.
         let stream = self.group.wrapping_mul(256).wrapping_add(pose.into());
-        let draws = || Draws::new(approaches.len(), Purpose::Active, &self.of.name, stream, self.seed);
+        let drawer = Drawer { purpose: Purpose::Active, name: &self.of.name, seed: self.seed };
+        let draws = || drawer.each(stream, approaches.len());
         let position = self.draws.entry(pose).or_insert_with(draws).next()?;
         approaches.get(position).copied()
     }
@@ -81,7 +94,6 @@ impl Stock<'_> {
 mod tests {
     use super::*;
     use crate::touches::Source;
-    use palpate_shared::Touch;
     use std::collections::BTreeSet;
 
     /// 520 approaches, one of two robots in each of 26 directions in turn.

@@ -242,7 +242,7 @@ fn a_calibrated_model_states_its_promise_and_keeps_it_on_fresh_touches() {
         assert!(MODEL.model().margins(&touch, &mut margins[0]) && model.margins(&touch, &mut margins[1]));
         assert_eq!(margins[0], margins[1]);
         let unseen = fresh(4_000, 4);
-        let margins = Margins::new(Candidate::Compiled(&model), &unseen).unwrap();
+        let margins = Margins::new(&model, &unseen).unwrap();
         let settings = SequentialSettings { error_rate: None, max_touches: None, sequences: 1_000, seed: 1 };
         let sequential = margins.sequential(&settings).unwrap();
         assert!(sequential.error <= 0.05 + 2.0 * sequential.error_standard_error, "{sequential:?}");

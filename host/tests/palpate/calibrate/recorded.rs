@@ -39,7 +39,7 @@ fn between<'t>(text: &'t str, before: &str, after: &str) -> &'t str {
 /// The share of wrong names among those that a model gives to touches of a robot.
 fn error(bytes: &[u8], touches: &Dataset) -> f64 {
     let model = Model::new(bytes).unwrap();
-    let margins = Margins::new(Candidate::Compiled(&model), touches).unwrap();
+    let margins = Margins::new(&model, touches).unwrap();
     let settings = SequentialSettings { error_rate: None, max_touches: None, sequences: 3_000, seed: 1 };
     margins.sequential(&settings).unwrap().error
 }

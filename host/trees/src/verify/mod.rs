@@ -1,16 +1,15 @@
 //! A compiled model over rows compared with its ensemble, and with the library that trained it: on given rows, and on rows
 //! made at every threshold.
 
-mod candidate;
 mod different;
 mod estimate;
+pub mod plain;
 pub mod predict;
 mod reference;
 mod score;
 pub mod together;
 mod values;
 
-pub use candidate::Candidate;
 pub use estimate::Estimate;
 pub use reference::{bound, margins, unit};
 pub use score::{Classes, Regression, RowsEvaluation, evaluate_rows};

@@ -1,11 +1,10 @@
 //! Predictions of a model over rows: the class of each row, or its value.
 
-use super::Candidate;
 use super::together::AT_ONCE;
 use crate::error::Result;
 use crate::rows::Encoder;
 use crate::rows::check_columns;
-use palpate_onboard::predicted_value;
+use palpate_onboard::Model;
 use palpate_shared::format::Prediction;
 use rayon::prelude::*;
 
@@ -31,60 +30,36 @@ pub(super) fn class_by(margins: &[f64], prediction: &Prediction) -> usize {
 }
 
 /// Predicts as the library does that trained the model: classes by the largest margin, or the values of a regression, with
-/// `raw` before their inverse link. `values` are rows of as many features as the model has. A compiled model is asked as on
-/// a chip, and gives the same bits.
+/// `raw` before their inverse link. `values` are rows of as many features as the model has. The model is asked as on a chip,
+/// and gives the same bits.
 ///
 /// # Errors
 /// For a model that is not over rows, or rows of another number of features.
 pub fn predict<V: Copy + Into<f64> + Sync>(
-    candidate: Candidate<'_>,
+    model: &Model<'_>,
     values: &[V],
     features: usize,
     raw: bool,
 ) -> Result<Predicted> {
-    let (wanted, outputs) = match candidate {
-        Candidate::Full(ensemble) => (ensemble.inputs.count(), ensemble.objects.len()),
-        Candidate::Compiled(model) => (model.feature_count(), model.object_count()),
-    };
-    if !candidate.is_of_rows() {
+    if model.descriptor().is_some() {
         return Err(super::computes_features());
     }
-    check_columns(features, wanted)?;
+    check_columns(features, model.feature_count())?;
+    let outputs = model.object_count();
     let rows = values.par_chunks_exact(features).with_min_len(AT_ONCE / 16);
-    Ok(match candidate {
-        Candidate::Full(ensemble) => {
-            let prediction = ensemble.prediction();
-            let margins = |row: &[V]| {
-                let row: Vec<f32> = row.iter().map(|&value| value.into() as f32).collect();
-                ensemble.margins_of_features(&row)
-            };
-            if outputs == 1 || prediction.targets {
-                let link = move |margin| if raw { margin } else { predicted_value(prediction, margin) };
-                Predicted::Values(rows.flat_map_iter(|row| margins(row).into_iter().map(link)).collect())
+    let encoder = Encoder::of(model);
+    if outputs == 1 || model.prediction().targets {
+        let values = |room: &mut Vec<i32>, row: &[V]| {
+            let (row, mut values) = (encoder.row(row), vec![0.0; outputs]);
+            if raw {
+                model.predict_raw_each(&row, room, &mut values);
             } else {
-                let nats = |row: &[V]| margins(row).into_iter().map(f64::from).collect::<Vec<_>>();
-                Predicted::Classes(rows.map(|row| class_of(&nats(row), prediction.last_of_ties)).collect())
+                model.predict_each(&row, room, &mut values);
             }
-        }
-        Candidate::Compiled(model) => {
-            let encoder = Encoder::of(model);
-            if outputs == 1 || model.prediction().targets {
-                let values = |room: &mut Vec<i32>, row: &[V]| {
-                    let (row, mut values) = (encoder.row(row), vec![0.0; outputs]);
-                    if raw {
-                        model.predict_raw_each(&row, room, &mut values);
-                    } else {
-                        model.predict_each(&row, room, &mut values);
-                    }
-                    values
-                };
-                Predicted::Values(rows.map_init(|| vec![0; outputs], values).flatten_iter().collect())
-            } else {
-                let class = |margins: &mut Vec<i32>, row: &[V]| {
-                    model.predict_class(&encoder.row(row), margins).unwrap_or_default()
-                };
-                Predicted::Classes(rows.map_init(|| vec![0; outputs], class).collect())
-            }
-        }
-    })
+            values
+        };
+        return Ok(Predicted::Values(rows.map_init(|| vec![0; outputs], values).flatten_iter().collect()));
+    }
+    let class = |margins: &mut Vec<i32>, row: &[V]| model.predict_class(&encoder.row(row), margins).unwrap_or_default();
+    Ok(Predicted::Classes(rows.map_init(|| vec![0; outputs], class).collect()))
 }

@@ -1,11 +1,11 @@
 //! Accuracy of a model over rows, row by row, or the error of a regression.
 
-use super::Candidate;
 use super::estimate::Estimate;
 use super::predict::{Predicted, predict};
 use crate::error::{Result, problem};
 use crate::rows::Rows;
-use crate::rows::{check_columns, not_a_class};
+use crate::rows::not_a_class;
+use palpate_onboard::Model;
 use std::collections::BTreeMap;
 
 /// Results of a model on labeled rows.
@@ -49,16 +49,9 @@ pub struct Regression {
 ///
 /// # Errors
 /// For a model that is not over rows, rows of another number of features, and labels that are none.
-pub fn evaluate_rows(candidate: Candidate<'_>, rows: &Rows) -> Result<RowsEvaluation> {
-    let (features, names) = match candidate {
-        Candidate::Full(ensemble) => (ensemble.inputs.count(), ensemble.objects.clone()),
-        Candidate::Compiled(model) => (model.feature_count(), crate::compile::names(model)),
-    };
-    if !candidate.is_of_rows() {
-        return Err(super::computes_features());
-    }
-    check_columns(rows.features, features)?;
-    let predicted = predict(candidate, &rows.values, rows.features, false)?;
+pub fn evaluate_rows(model: &Model<'_>, rows: &Rows) -> Result<RowsEvaluation> {
+    let names = crate::compile::names(model);
+    let predicted = predict(model, &rows.values, rows.features, false)?;
     let label = |row: usize| rows.labels.get(row).map_or("", String::as_str);
     let wrong = |row: usize, known: &str| not_a_class(label(row), row + 1, known);
     let classes = match predicted {

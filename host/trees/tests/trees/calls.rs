@@ -7,7 +7,6 @@ use palpate_shared::format::{Limits, Tag};
 use palpate_trees::compile::{Language, Leaf, Restated, Settings, compile, emit, restate};
 use palpate_trees::ensemble::Probability;
 use palpate_trees::rows::Encoder;
-use palpate_trees::verify::Candidate;
 use palpate_trees::verify::predict::{Predicted, predict};
 use std::path::Path;
 use std::process::Command;
@@ -118,7 +117,7 @@ fn a_call_gives_the_class_value_and_probabilities_with_nothing_prepared() {
                 rows.len(),
             );
             calls += &format!("    run_{name}();\n");
-            let predicted = predict(Candidate::Compiled(&model), &table.values, rows[0].len(), false).unwrap();
+            let predicted = predict(&model, &table.values, rows[0].len(), false).unwrap();
             for (row, margins) in margins.iter().enumerate() {
                 let own = match &predicted {
                     Predicted::Classes(classes) => vec![classes[row] as f64],

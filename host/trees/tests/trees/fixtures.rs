@@ -4,8 +4,10 @@ use crate::table::cells;
 use palpate_trees::Result;
 use palpate_trees::ensemble::import::{Options, read};
 use palpate_trees::ensemble::{Ensemble, Inputs, Node, Output, Provenance, Schema, Tree};
+use palpate_trees::onboard::predicted_value;
 use palpate_trees::rows::Rows;
 use palpate_trees::shared::Descriptor;
+use palpate_trees::verify::predict::{Predicted, class_of};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::sync::LazyLock;
@@ -32,6 +34,21 @@ pub(crate) static FIXTURES: LazyLock<Vec<Fixture>> = LazyLock::new(|| {
     assert!(all.len() > 80, "{} models", all.len());
     all
 });
+
+/// Predictions of an ensemble's own trees, in f32.
+pub(crate) fn predicted<V: Copy + Into<f64>>(ensemble: &Ensemble, values: &[V]) -> Predicted {
+    let prediction = ensemble.prediction();
+    let margins = values.chunks_exact(ensemble.inputs.count()).map(|row| {
+        let row: Vec<f32> = row.iter().map(|&value| value.into() as f32).collect();
+        ensemble.margins_of_features(&row)
+    });
+    if ensemble.objects.len() == 1 || prediction.targets {
+        return Predicted::Values(margins.flatten().map(|margin| predicted_value(prediction, margin)).collect());
+    }
+    let class =
+        |margins: Vec<f32>| class_of(&margins.into_iter().map(f64::from).collect::<Vec<_>>(), prediction.last_of_ties);
+    Predicted::Classes(margins.map(class).collect())
+}
 
 /// The directory of the files.
 pub(crate) fn directory() -> PathBuf {

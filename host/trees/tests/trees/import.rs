@@ -1,6 +1,8 @@
 //! Files that other libraries wrote, with their own margins: `tests/data/import`.
 
-use crate::fixtures::{FIXTURES, Fixture, assert_says, directory, files, fixture, leaf, of_one_value, parsed, split};
+use crate::fixtures::{
+    FIXTURES, Fixture, assert_says, directory, files, fixture, leaf, of_one_value, parsed, predicted, split,
+};
 use palpate_base::with;
 use palpate_trees::compile::{self, Leaf, Settings};
 use palpate_trees::ensemble::import::Options;
@@ -9,7 +11,7 @@ use palpate_trees::prove::prove;
 use palpate_trees::rows::{self, Encoder, Features, Rows, columns_of, scales};
 use palpate_trees::shared::format::f32_key;
 use palpate_trees::verify::predict::{Predicted, predict};
-use palpate_trees::verify::{Candidate, Library, verify};
+use palpate_trees::verify::{Library, verify};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -219,7 +221,7 @@ fn classes_and_values_are_the_librarys_own_predictions_for_every_link() {
             }
         }
         // The same of the file's own trees.
-        match predict(Candidate::Full(ensemble), &rows.values, 4, false).unwrap() {
+        match predicted(ensemble, &rows.values) {
             Predicted::Values(values) => {
                 let expected = said.iter().flatten().map(|text| text.parse::<f64>().unwrap());
                 let largest = expected.clone().fold(0.0, |most: f64, value| most.max(value.abs()));
@@ -331,7 +333,7 @@ fn tied_votes_of_a_forest_go_to_the_class_that_the_library_takes() {
         for leaf in [Leaf::F32, Leaf::I16, Leaf::I8] {
             let bytes = compiled(ensemble, leaf);
             let model = compile::open(&bytes).unwrap();
-            let classes = predict(Candidate::Compiled(&model), &rows.values, 4, false).unwrap();
+            let classes = predict(&model, &rows.values, 4, false).unwrap();
             assert_eq!(classes, Predicted::Classes(expected.clone()), "{name}, {leaf:?}");
         }
     }
@@ -345,9 +347,7 @@ fn whole_numbers_that_f32_does_not_hold_are_compared_as_lightgbm_does_where_they
         let settings = with!(Settings::default(), leaf = Leaf::F32, scales);
         let bytes = compile::compile(ensemble, &settings).unwrap().bytes;
         let model = compile::open(&bytes).unwrap();
-        let Predicted::Classes(classes) = predict(Candidate::Compiled(&model), &rows.values, 4, false).unwrap() else {
-            panic!("classes")
-        };
+        let Predicted::Classes(classes) = predict(&model, &rows.values, 4, false).unwrap() else { panic!("classes") };
         classes
     };
     assert_ne!(classes(None), expected, "f32 holds every 128th second");
@@ -386,12 +386,12 @@ fn regressions_of_any_size_of_target_give_the_ensembles_own_bits() {
         imported.exact = None;
         let bytes = compiled(&scaled, Leaf::F32);
         let model = compile::open(&bytes).unwrap();
-        let full = predict(Candidate::Full(&scaled), &rows.values, 4, false).unwrap();
-        assert_eq!(predict(Candidate::Compiled(&model), &rows.values, 4, false).unwrap(), full, "{factor:e}");
+        let full = predicted(&scaled, &rows.values);
+        assert_eq!(predict(&model, &rows.values, 4, false).unwrap(), full, "{factor:e}");
         let bytes = compiled(&scaled, Leaf::I16);
         let model = compile::open(&bytes).unwrap();
         let (Predicted::Values(full), Predicted::Values(own)) =
-            (full, predict(Candidate::Compiled(&model), &rows.values, 4, false).unwrap())
+            (full, predict(&model, &rows.values, 4, false).unwrap())
         else {
             panic!("values")
         };
@@ -466,8 +466,7 @@ fn an_onnx_regressor_that_starts_from_several_values_is_refused_and_is_no_classi
     assert_says(error, &["it has 2 tree ensembles", "AdaBoost, Bagging"]);
     assert_says(of(&[0.5, 0.25], "NONE").unwrap_err(), &["base_values has 2 numbers for 1 target"]);
     let rows: [f32; 1] = [0.0];
-    let predicted = predict(Candidate::Full(&of(&[], "LOGISTIC").unwrap()), &rows, 1, false).unwrap();
-    let Predicted::Values(values) = predicted else { panic!("a value") };
+    let Predicted::Values(values) = predicted(&of(&[], "LOGISTIC").unwrap(), &rows) else { panic!("a value") };
     assert!((values[0] - 0.817_574_5).abs() < 1e-6, "{values:?}");
 }
 

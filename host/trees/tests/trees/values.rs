@@ -2,6 +2,7 @@
 //! arithmetic made here: trees are grown on a table of the test's own.
 
 use crate::calls::{initializers, printed};
+use crate::fixtures::predicted;
 use palpate_base::with;
 use palpate_onboard::{C_HEADER, Model};
 use palpate_trees::compile::{self, Compiled, Language, Leaf, Settings};
@@ -11,7 +12,7 @@ use palpate_trees::prove::prove;
 use palpate_trees::rows::{Encoder, Rows, notes, scales};
 use palpate_trees::shared::format::Prediction;
 use palpate_trees::verify::predict::{Predicted, predict};
-use palpate_trees::verify::{Candidate, Library, margins, verify};
+use palpate_trees::verify::{Library, margins, verify};
 
 /// Features of a row.
 const FEATURES: usize = 4;
@@ -176,7 +177,7 @@ fn compiled(ensemble: &Ensemble, leaf: Leaf) -> Compiled {
 
 /// Values as a chip gives them, and as its margins have them in f64, row by row.
 fn own(model: &Model<'_>, rows: &Rows) -> (Vec<f32>, Vec<f64>) {
-    let predicted = predict(Candidate::Compiled(model), &rows.values, FEATURES, false).unwrap();
+    let predicted = predict(model, &rows.values, FEATURES, false).unwrap();
     let Predicted::Values(values) = predicted else { panic!("values") };
     let in_f64 = rows.values.chunks(FEATURES).flat_map(|row| margins(model, &Encoder::of(model).row(row)));
     (values, in_f64.collect())
@@ -257,9 +258,9 @@ fn values_of_targets_far_from_0_and_of_different_sizes_stay_the_librarys() {
                 }
             }
             let compiled = compiled(&ensemble, Leaf::F32);
-            let full = predict(Candidate::Full(&ensemble), &rows.values, FEATURES, false).unwrap();
+            let full = predicted(&ensemble, &rows.values);
             let model = Model::new(&compiled.bytes).unwrap();
-            assert_eq!(predict(Candidate::Compiled(&model), &rows.values, FEATURES, false).unwrap(), full, "{kind:?}");
+            assert_eq!(predict(&model, &rows.values, FEATURES, false).unwrap(), full, "{kind:?}");
             assert_eq!(model.output_scale(0), None);
             assert!(kind != Kind::XgBoost || !compiled.notes.iter().any(|note| note.contains("are only known")));
             prove(&compiled.bytes, &ensemble).unwrap();

@@ -8,8 +8,7 @@ use crate::commands::numbers::error_rate;
 use crate::commands::{Global, shell};
 use clap::ArgGroup;
 use palpate::Result;
-use palpate::error::{Place, problem};
-use palpate::evaluate::model_file::ModelFile;
+use palpate::compile::CompiledModel;
 use palpate::evaluate::{self, Classes, Finding, Regression, RowsEvaluation, evaluate_rows};
 use palpate::output;
 use palpate::rows::{Features, SequenceColumns};
@@ -27,7 +26,7 @@ use std::path::PathBuf;
             .requires("sequence_column")
     ),
     after_help = "\
-Each row is taken alone, and compared with its label: a class by name or number from 0, or a number for a regression. With --sequence-column the rows of a sequence are followed to a verdict; that needs a compiled model, which stops by its own thresholds, and shows whether it keeps its promise. docs/guide/streams.md explains the figures.
+Each row is taken alone, and compared with its label: a class by name or number from 0, or a number for a regression. With --sequence-column the rows of a sequence are followed to a verdict; the model stops by its own thresholds, and shows whether it keeps its promise. docs/guide/streams.md explains the figures.
 
 Examples:
   palpate rows evaluate model.palpate rows.csv --label kind
@@ -61,21 +60,16 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: Arguments, global: &Global) -> Result<()> {
-    let file = kinds::file(&arguments.model, ModelKind::Rows, "evaluate")?;
+    let compiled = kinds::file(&arguments.model, ModelKind::Rows, "evaluate")?;
     match &arguments.sequence_column {
-        Some(sequence) => on_sequences(&arguments, sequence, &file, global),
-        None => on_rows(&arguments, &file, global),
+        Some(sequence) => on_sequences(&arguments, sequence, &compiled, global),
+        None => on_rows(&arguments, &compiled, global),
     }
 }
 
 /// Evaluates a compiled model on sequences of rows.
-fn on_sequences(arguments: &Arguments, sequence: &str, file: &ModelFile, global: &Global) -> Result<()> {
+fn on_sequences(arguments: &Arguments, sequence: &str, compiled: &CompiledModel, global: &Global) -> Result<()> {
     let Arguments { model: path, rows, label, group_column, error_rate, max_rows, .. } = arguments;
-    let ModelFile::Compiled(compiled) = file else {
-        return Err(problem!("an ensemble has no thresholds to stop at")
-            .fix("Compile it with `palpate export`, and give the model.")
-            .at(Place::file(path)));
-    };
     let model = compiled.model();
     let weights = arguments.expected.weights(&compiled.names(), &evaluate::own_weights(&model))?;
     stream::check(&model).map_err(|error| error.in_file(path))?;
@@ -100,14 +94,11 @@ fn on_sequences(arguments: &Arguments, sequence: &str, file: &ModelFile, global:
 }
 
 /// Evaluates a model on labeled rows, each taken alone.
-fn on_rows(arguments: &Arguments, file: &ModelFile, global: &Global) -> Result<()> {
+fn on_rows(arguments: &Arguments, compiled: &CompiledModel, global: &Global) -> Result<()> {
     let path = &arguments.rows;
-    let features = match file {
-        ModelFile::Full(ensemble) => Features::from(&**ensemble),
-        ModelFile::Compiled(compiled) => Features::from(&compiled.model()),
-    };
-    let rows = read_rows(path, features, Some(&arguments.label))?;
-    let evaluated = file.with(|candidate| evaluate_rows(candidate, &rows)).map_err(|error| error.in_file(path))?;
+    let model = compiled.model();
+    let rows = read_rows(path, Features::from(&model), Some(&arguments.label))?;
+    let evaluated = evaluate_rows(&model, &rows).map_err(|error| error.in_file(path))?;
     if global.json {
         return output::print_json(&evaluated);
     }

@@ -30,7 +30,7 @@ fn what_a_run_states_is_what_its_model_does() {
     let (mut fresh, _) = capture::in_memory(&objects, &unseen.into(), &()).unwrap();
     assert_eq!(fresh.several().values().copied().collect::<Vec<_>>(), [2; 3]);
     evaluate::add_noise(&mut fresh, &settings.noise, 98).unwrap();
-    let margins = Margins::new(Candidate::Compiled(&model), &fresh).unwrap();
+    let margins = Margins::new(&model, &fresh).unwrap();
     let sequences = SequentialSettings { error_rate: None, max_touches: None, sequences: 500, seed: 9 };
     let measured = margins.approaches(&[20], &sequences).unwrap();
     let stated = summary.ours.evaluation.approaches.unwrap();
