@@ -46,7 +46,9 @@ impl Follower for Sums<'_> {
     }
 
     fn push(&mut self, margins: &[i32]) -> Verdict {
-        self.evidence.iter_mut().zip(margins).for_each(|(sum, &margin)| *sum += i64::from(margin));
+        // The sum of an object that is not expected is the least number there is.
+        let sums = self.evidence.iter_mut().zip(margins);
+        sums.for_each(|(sum, &margin)| *sum = sum.saturating_add(margin.into()));
         Verdict::Undecided
     }
 
@@ -79,7 +81,7 @@ pub(crate) fn best<T: PartialOrd>(evidence: &[T]) -> usize {
 /// The output with the most evidence of the object that leads, and the sum of the other objects' weights, its own being 1. The
 /// first `known` outputs can be named; `numbers` are those of their objects, where several belong to one.
 fn leading(evidence: &[i64], known: usize, numbers: Option<&[u8]>, unit: f64) -> (usize, f64) {
-    let ahead = |output: usize, of: i64| ((evidence[output] - of) as f64 * unit).exp();
+    let ahead = |output: usize, of: i64| (evidence[output].saturating_sub(of) as f64 * unit).exp();
     let Some(numbers) = numbers else {
         let best = best(&evidence[..known]);
         let others = (0..evidence.len()).filter(|&object| object != best);

@@ -127,7 +127,7 @@ fn models_and_ensembles_are_read_as_models_and_anything_else_is_refused_by_name(
     std::fs::write(path("truncated"), &compiled.bytes[..compiled.bytes.len() - 1]).unwrap();
     std::fs::write(path("empty"), b"").unwrap();
     // More thresholds than a model can have: it is an ensemble, and no model.
-    let many = (0..66).map(|tree| chain(1_000, |_| 0).into_iter().map(move |node| shifted(node, tree)).collect());
+    let many = (0..264).map(|tree| chain(250, |_| 0).into_iter().map(move |node| shifted(node, tree)).collect());
     self::ensemble(Descriptor::Curvature, many.collect()).save(path("large")).unwrap();
     for bad in ["truncated", "empty", "missing", "large"] {
         let error = read_any(path(bad)).err().unwrap();
