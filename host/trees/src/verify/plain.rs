@@ -105,9 +105,9 @@ mod tests {
     #[test]
     fn outputs_of_an_object_add_up_and_the_strongest_of_them_is_named() {
         let mut together = plain(&[0, 1, 1], 0.9);
-        together.push(&[1.0, 0.5, 0.6]);
+        together.push(&[1.0, 0.5, 0.625]);
         assert_eq!(together.ended, Some(Ended { named: Some(2), steps: 1 }));
-        assert!((together.rivals(2, 1.0) - 1.0_f64.exp() / (0.5_f64.exp() + 0.6_f64.exp())).abs() < 1e-12);
+        assert!((together.rivals(2, 1.0) - 1.0_f64.exp() / (0.5_f64.exp() + 0.625_f64.exp())).abs() < 1e-12);
         // A background is never named.
         let mut background = Plain { known: 2, ..plain(&[0, 1, 2], 0.5) };
         background.push(&[1.0, 0.0, 5.0]);
