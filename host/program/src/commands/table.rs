@@ -28,7 +28,7 @@ pub(crate) struct TableArguments {
     max_touches: Option<u32>,
     /// Aim of simulated approaches: chosen, where they tell most, or random [default: the promise's, or chosen]
     #[arg(long, value_name = "HOW", value_parser = aimed)]
-    aimed: Option<Aimed>,
+    pub(super) aimed: Option<Aimed>,
     /// Go on after the name until the place is as sure: half of its 95 % intervals, such as 3mm/5deg
     #[arg(long, value_name = "LENGTH/ANGLE", value_parser = until)]
     until: Option<Until>,
@@ -67,11 +67,6 @@ pub(super) struct Table {
 }
 
 impl TableArguments {
-    /// The aim of the approaches, if it is given.
-    pub(super) fn aimed(&self) -> Option<Aimed> {
-        self.aimed
-    }
-
     /// The table of a command such as `calibrate`, with objects of these meshes and files of touches.
     pub(super) fn table(
         &self,

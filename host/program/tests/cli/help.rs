@@ -3,7 +3,7 @@
 use crate::{Folder, command, fails, palpate, run, says, stderr, stdout, succeeds};
 use std::process::Stdio;
 
-/// The program's commands, as its help lists them in groups: what stands before two blanks.
+/// The program's commands, as its help lists them, with those below them.
 fn commands() -> Vec<String> {
     let help = help(&["--help"], 100);
     let list = help.lines().take_while(|line| *line != "Global options:").filter(|line| line.starts_with("  "));
@@ -14,7 +14,7 @@ fn commands() -> Vec<String> {
     names.into_iter().collect()
 }
 
-/// What stands before two blanks.
+/// The text before two blanks.
 fn first(line: &str) -> String {
     line.trim_start().split("  ").next().unwrap().to_owned()
 }

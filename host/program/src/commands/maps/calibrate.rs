@@ -62,7 +62,7 @@ pub(super) fn run(arguments: Arguments, global: &Global) -> Result<()> {
             .map_err(|error| error.in_file(directory))?
     } else {
         // The sequences of an evaluation with the same seed are others.
-        let (seed, aimed) = (terms.seed.wrapping_mul(2), table.aimed().unwrap_or(Aimed::Chosen));
+        let (seed, aimed) = (terms.seed.wrapping_mul(2), table.aimed.unwrap_or(Aimed::Chosen));
         let terms = Terms { seed, aimed, unknown: arguments.detect_unknown, ..terms };
         locate::calibrate(maps, &standing, &probe, &terms, &Bar::new()).map_err(|error| error.in_file(model))?
     };

@@ -3,9 +3,8 @@
 use super::recognize::Next;
 use crate::commands::recognize_lines::{Event, each_of};
 use crate::commands::shape::noise;
-use crate::commands::{Global, kinds};
+use crate::commands::{Global, kinds, print_line};
 use palpate::locate::{self, Shape};
-use palpate::output;
 use palpate::probe::file::ProbeFile;
 use palpate::{Error, Result};
 use palpate_shared::format::Length;
@@ -98,9 +97,7 @@ pub(super) fn run(arguments: Arguments, _: &Global) -> Result<()> {
         let is_known = known >= goal.share;
         let next = (!is_known).then(|| shape.next(&relief).into());
         let state = if is_known { "known" } else { "exploring" };
-        let line = Explored { touch, state, known: (known * 1e3).round() / 1e3, next };
-        // Numbers and strings are always JSON.
-        output::print(&format!("{}\n", serde_json::to_string(&line).unwrap_or_default()))
+        print_line(&Explored { touch, state, known: (known * 1e3).round() / 1e3, next })
     })
 }
 

@@ -4,12 +4,11 @@ use crate::commands::expected::ExpectedArguments;
 use crate::commands::numbers::error_rate;
 use crate::commands::recognize_lines::{Event, Line, each_of};
 use crate::commands::rows::verdict_name;
-use crate::commands::{Global, kinds};
+use crate::commands::{Global, kinds, print_line};
 use palpate::error::Kind;
 use palpate::locate::{self, Approach, Hand, Locating, Maps, POSE, Pose};
-use palpate::output;
 use palpate::{Error, Result, compile};
-use palpate_onboard::{Stopping, Verdict};
+use palpate_onboard::Verdict;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -122,12 +121,7 @@ pub(in crate::commands) fn print_located<'m>(
     let pose = modes.next();
     let placement = pose.as_ref().map_or("", |pose| pose.placement);
     let located = Located { line, placement, pose, modes: modes.collect(), next: next.map(Next::from) };
-    // Numbers and strings are always JSON.
-    output::print(&format!(
-        "{}
-",
-        serde_json::to_string(&located).unwrap_or_default()
-    ))
+    print_line(&located)
 }
 
 pub(super) fn run(arguments: Arguments, global: &Global) -> Result<()> {
@@ -146,7 +140,16 @@ pub(super) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let weights = arguments.expected.weights(&names, &vec![1.0; names.len()])?;
     let hand = Hand::of(&maps).ok_or_else(locate::no_hand)?;
     let within = locate::workspace(&maps, arguments.workspace)?;
-    let mut stream = Stream::new(maps, hand, stopping, weights, arguments.next.then_some(within), global);
+    let mut stream = Stream {
+        maps,
+        hand,
+        locating: locate::locating(maps, stopping, None),
+        weights,
+        within: arguments.next.then_some(within),
+        json: global.json,
+        seed: u32::try_from(global.seed()).unwrap_or(1),
+        touches: 0,
+    };
     stream.begin();
     each_of(&arguments.file, &mut |event| stream.take(event))
 }
@@ -164,20 +167,7 @@ struct Stream<'m> {
     touches: u32,
 }
 
-impl<'m> Stream<'m> {
-    fn new(
-        maps: Maps<'m>,
-        hand: Hand,
-        stopping: Stopping,
-        weights: Option<Vec<u32>>,
-        within: Option<u32>,
-        global: &Global,
-    ) -> Self {
-        let locating = locate::locating(maps, stopping, None);
-        let seed = u32::try_from(global.seed()).unwrap_or(1);
-        Self { maps, hand, locating, weights, within, json: global.json, seed, touches: 0 }
-    }
-
+impl Stream<'_> {
     /// Begins another object.
     fn begin(&mut self) {
         self.touches = 0;
