@@ -59,11 +59,9 @@ pub use approaches::Approaches;
 pub use cost_of_noise::{CostOfNoise, LEAST as LEAST_FOR_COST, cost_of_noise};
 pub use curve::{Confidence, Curve};
 pub(crate) use margins::OfTouches;
-#[cfg(feature = "train")]
-pub(crate) use margins::best;
-#[cfg(feature = "train")]
-pub(crate) use margins::leading;
 pub use margins::{Margins, delivered};
+#[cfg(feature = "train")]
+pub(crate) use margins::{best, leading};
 pub use measure::{Evaluated, Wanted, measure, own_weights};
 #[cfg(feature = "train")]
 pub(crate) use noisy::ROBOTS;
