@@ -109,7 +109,7 @@ pub use exponential::exp2_negative;
 pub use layouts::batch::Batch;
 #[cfg(feature = "code")]
 pub use model::Code;
-pub use model::{Model, Refused, inverse_link, predicted_value};
+pub use model::{Model, Refused, predicted_value};
 pub use palpate_shared as shared;
 pub use palpate_shared::format::f32_key;
 

@@ -6,7 +6,7 @@
 use crate::touch::{ContactTime, Pose, Touch};
 
 /// The most features that a built-in descriptor has.
-pub const MAX_FEATURES: usize = 10;
+pub(crate) const MAX_FEATURES: usize = 10;
 
 /// The value of a feature that a missing contact or an unknown pose leaves open.
 pub const MISSING_FEATURE: i32 = i32::MIN;

@@ -36,7 +36,7 @@ mod poses;
 mod touch;
 
 pub use checksum::checksum;
-pub use descriptor::{Descriptor, Features, MAX_FEATURES, MISSING_FEATURE};
+pub use descriptor::{Descriptor, Features, MISSING_FEATURE};
 pub use pattern::{ContactPattern, Patterns};
 pub use place::{Approach, TablePose};
 pub use poses::{DIRECTIONS, MOST_POSES, Poses};

@@ -27,7 +27,7 @@ impl ContactPattern {
     /// The pattern of fingers in their order along the row: whether each touched.
     ///
     /// Cost: a few instructions. Cannot fail.
-    pub const fn of([first, middle, last]: [bool; 3]) -> Self {
+    pub(crate) const fn of([first, middle, last]: [bool; 3]) -> Self {
         // Four bits for each: with no finger, the middle one, an outer one, that and the middle one, both outer ones, all.
         const CODES: u32 = 0x0054_3120;
         match CODES >> (8 * (first as u32 + last as u32) + 4 * middle as u32) & 7 {
@@ -94,7 +94,7 @@ impl Patterns {
     }
 
     /// The patterns that are in both sets.
-    pub const fn and(self, other: Self) -> Self {
+    pub(crate) const fn and(self, other: Self) -> Self {
         Self(self.0 & other.0)
     }
 

@@ -178,7 +178,7 @@ impl Error {
     }
 
     /// The reader of standard output went away.
-    pub fn closed() -> Self {
+    pub(crate) fn closed() -> Self {
         Self::new("standard output was closed").as_kind(Kind::Closed)
     }
 

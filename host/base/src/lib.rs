@@ -18,7 +18,7 @@ pub mod progress;
 pub mod results;
 pub mod wording;
 
-pub use error::{Error, Result};
+pub use error::Error;
 
 /// A value with some of its fields replaced, `with!(Noise::default(), time = 0.1, missed)`: the literal with `..` that other
 /// crates cannot write of a type that may get more fields.

@@ -92,7 +92,7 @@ impl Connection {
     }
 
     /// Counts kept by this end.
-    pub fn statistics(&self) -> HostStatistics {
+    pub(crate) fn statistics(&self) -> HostStatistics {
         self.end.statistics()
     }
 
@@ -249,7 +249,7 @@ impl Connection {
     ///
     /// # Errors
     /// When the line broke or the chip is silent.
-    pub fn program(&mut self) -> Result<Option<String>> {
+    pub(crate) fn program(&mut self) -> Result<Option<String>> {
         Ok(Some(self.must(Request::Program, name)?).filter(|program| !program.is_empty()))
     }
 
@@ -257,7 +257,7 @@ impl Connection {
     ///
     /// # Errors
     /// When the line broke or the chip is silent.
-    pub fn chip_statistics(&mut self) -> Result<Statistics> {
+    pub(crate) fn chip_statistics(&mut self) -> Result<Statistics> {
         self.must(Request::Counts, |answer| match answer {
             Answer::Counts(statistics) => Some(statistics),
             _ => None,
@@ -320,7 +320,7 @@ impl Connection {
     ///
     /// # Errors
     /// When the chip has none, the line broke or the chip is silent.
-    pub fn places(&mut self) -> Result<(PlaceMessage, Vec<Pose>)> {
+    pub(crate) fn places(&mut self) -> Result<(PlaceMessage, Vec<Pose>)> {
         places(|rank| {
             self.must(Request::Place { rank }, |answer| match answer {
                 Answer::Place(place) => Some(place),
@@ -333,7 +333,7 @@ impl Connection {
     ///
     /// # Errors
     /// Errors of [`places`](Self::places).
-    pub fn next_press(&mut self, within: Option<u32>) -> Result<Approach> {
+    pub(crate) fn next_press(&mut self, within: Option<u32>) -> Result<Approach> {
         self.must(Request::NextPress { within }, |answer| match answer {
             Answer::NextPress(approach) => Some(approach),
             _ => None,

@@ -39,7 +39,7 @@ const PATIENCE: Duration = Duration::from_secs(120);
 
 impl Chip {
     /// Path of the image that `cargo build --release` in `onboard/firmware` makes, from the project's folder.
-    pub fn image(self) -> PathBuf {
+    pub(crate) fn image(self) -> PathBuf {
         let target = match self {
             Self::M4F => "thumbv7em-none-eabihf",
             Self::M0Plus => "thumbv6m-none-eabi",

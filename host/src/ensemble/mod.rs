@@ -13,7 +13,7 @@ pub use origin::{StatedProbe, TouchOrigin, compiled_trained_on};
 pub(crate) use origin::{object_of, stroke_of};
 pub use palpate_trees::ensemble::*;
 pub(crate) use schema::SCHEMAS;
-pub use schema::{OverTouches, feature_row, inputs, schema};
+pub use schema::{OverTouches, feature_row, inputs};
 pub use trained::Trained;
 
 use crate::error::Result;

@@ -35,7 +35,7 @@ impl TouchOrigin {
     const PLACEMENTS: &str = "palpate_placements";
 
     /// Statements of touches about themselves, and the probe that they were made with.
-    pub fn new(dataset: &Dataset, probe: Option<StatedProbe>) -> Self {
+    pub(crate) fn new(dataset: &Dataset, probe: Option<StatedProbe>) -> Self {
         Self { probe, touches: fingerprints(dataset), ..Self::default() }
     }
 
@@ -88,7 +88,7 @@ impl TouchOrigin {
     }
 
     /// Provenance of an ensemble that states this and nothing else.
-    pub fn origin(&self) -> Provenance {
+    pub(crate) fn origin(&self) -> Provenance {
         let mut origin = Provenance::default();
         self.state(&mut origin);
         origin

@@ -16,7 +16,7 @@ pub(crate) const SCHEMAS: &[Schema] = &[
 ];
 
 /// Schema of a descriptor's features.
-pub const fn schema(descriptor: Descriptor) -> Schema {
+pub(crate) const fn schema(descriptor: Descriptor) -> Schema {
     Schema {
         code: descriptor.code(),
         name: descriptor.name(),

@@ -53,8 +53,8 @@ mod tests;
 mod timer;
 mod touched;
 mod words;
-pub use outcome::{Fit, GrazingEstimate, Warning};
-pub use words::{Estimate, NOT_TOLD, between, offset, offset_between};
+pub use outcome::{Fit, GrazingEstimate};
+pub use words::{NOT_TOLD, between, offset, offset_between};
 
 use crate::capture;
 use crate::error::{Error, Result, problem};
@@ -98,7 +98,7 @@ impl Default for Settings {
 }
 
 /// The fewest recorded touches with two or three contacts from which a probe is fitted.
-pub const LEAST: usize = 20;
+pub(crate) const LEAST: usize = 20;
 
 /// Recordings and simulated touches, with which a candidate is compared.
 struct Evidence<'a> {

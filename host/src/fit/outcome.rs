@@ -7,7 +7,7 @@ use super::words::{Estimate, NOT_TOLD, between, offset, offset_between};
 use super::{Evidence, Settings, Timer};
 use crate::probe::approach::{FINGERS, Probe};
 use crate::probe::hand;
-use crate::probe::noise::{Grazing, Noise};
+use crate::probe::noise::Noise;
 use crate::touches::Surroundings;
 use crate::with;
 use palpate_shared::format::Counted;
@@ -15,7 +15,7 @@ use palpate_shared::format::Length;
 use serde::Serialize;
 use std::fmt::{self, Write as _};
 
-/// Fingers that bend aside at flat angles: see [`Grazing`].
+/// Fingers that bend aside at flat angles: see [`Grazing`](crate::probe::noise::Grazing).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct GrazingEstimate {
     /// In degrees.
@@ -153,23 +153,6 @@ fn tolerance(stroke: &Estimate) -> f64 {
 }
 
 impl Fit {
-    /// Noise that the real probe adds to touches: the likeliest values.
-    pub fn real(&self) -> Noise {
-        let [middle, third] = self.late.map(|late| -1e3 * late.value);
-        with!(
-            Noise::default(),
-            deviation = (1e3 * self.noise.value).into(),
-            timer = 1e3 * self.timer.unwrap_or(0.0),
-            missed = self.missed.map_or([0.0; FINGERS], |missed| missed.map(|share| share.value)),
-            bent = [0.0, middle, third],
-            speed = self.speed_factor.value,
-            grazing = self.grazing.map_or_else(Grazing::default, |GrazingEstimate { angle, bend }| Grazing {
-                angle: angle.value,
-                bend: 1e3 * bend.value,
-            })
-        )
-    }
-
     /// The probe as the text of a `probe.toml`, with the intervals as comments.
     pub fn toml(&self) -> String {
         let Probe { radius, spacing, speed, tilt, stroke, travel, stroke_tolerance, .. } = self.probe;

@@ -1,9 +1,10 @@
 //! A simulator of imperfect probes that shares no code with the fit, and the parameters fitted to its touches.
 
+use super::words::Estimate;
 use super::*;
 
 use crate::mesh::builtin;
-use crate::probe::approach::Probe;
+use crate::probe::approach::{FINGERS, Probe};
 use crate::probe::noise::Grazing;
 use crate::touches::{ObjectTouches, Recorded, Source, Surroundings};
 use crate::with;
@@ -25,6 +26,32 @@ struct Crooked {
 const STRAIGHT: Crooked = Crooked { longer: 1.0, late: [0.0; 3], noise: 0.0, missed: [0.0; 3], tick: 1.0 };
 const BENT: Crooked =
     Crooked { longer: 0.92, late: [0.0, 3.0, -4.0], noise: 3.0, missed: [0.01, 0.03, 0.0], ..STRAIGHT };
+
+impl Fit {
+    /// The likeliest values of the noise that the real probe adds to touches.
+    fn real(&self) -> Noise {
+        let [middle, third] = self.late.map(|late| -1e3 * late.value);
+        with!(
+            Noise::default(),
+            deviation = (1e3 * self.noise.value).into(),
+            timer = 1e3 * self.timer.unwrap_or(0.0),
+            missed = self.missed.map_or([0.0; FINGERS], |missed| missed.map(|share| share.value)),
+            bent = [0.0, middle, third],
+            speed = self.speed_factor.value,
+            grazing = self.grazing.map_or_else(Grazing::default, |GrazingEstimate { angle, bend }| Grazing {
+                angle: angle.value,
+                bend: 1e3 * bend.value,
+            })
+        )
+    }
+}
+
+impl Estimate {
+    /// True if the interval holds a value.
+    fn holds(&self, value: f64) -> bool {
+        self.low.is_none_or(|low| low <= value) && self.high.is_none_or(|high| value <= high)
+    }
+}
 
 /// A generator of its own: that of Numerical Recipes, and sums of twelve uniform numbers for normal ones.
 struct Numbers(u64);

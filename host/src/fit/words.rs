@@ -19,11 +19,6 @@ impl Estimate {
     pub(crate) fn width(&self) -> Option<f64> {
         Some(self.high? - self.low?)
     }
-
-    /// True if the interval holds a value.
-    pub fn holds(&self, value: f64) -> bool {
-        self.low.is_none_or(|low| low <= value) && self.high.is_none_or(|high| value <= high)
-    }
 }
 
 /// Words for an interval without an end.

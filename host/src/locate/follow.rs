@@ -12,7 +12,7 @@ use std::convert::Infallible;
 /// Room for touches.
 pub const TOUCHES: usize = 32;
 /// Cells within the memory of a chip with 128 KB.
-pub const CELLS: usize = 14_336;
+pub(crate) const CELLS: usize = 14_336;
 /// Cells and objects on a host that follows many objects.
 const MANY: usize = 65_536;
 

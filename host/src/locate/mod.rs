@@ -30,22 +30,22 @@ mod table;
 mod world;
 mod write;
 
-pub use follow::{CELLS, Locating, TOUCHES, locating, seen, within, workspace};
-pub use inspect::{Cost, Inspected, MapsFile, OfPlacement, Promised, hand, inspect, names, stated};
+pub(crate) use follow::CELLS;
+pub use follow::{Locating, TOUCHES, locating, seen, within, workspace};
+pub use inspect::{Inspected, MapsFile, OfPlacement, Promised, hand, inspect, names, stated};
 pub use learn::{cast, learn, probe_of};
 pub use lying::Lying;
 pub use palpate_onboard::locate::{Approach, Effort, Hand, Maps, POSE, Pose, Seen, TESTED};
-pub use pose::{Off, Until};
-pub use promise::{
-    Calibrated, Evaluation, LeftOut, OfObject, Terms, Tested, ToPlace, calibrate, calibrate_recorded, evaluate,
-};
-pub use refused::{BELOW, FARTHEST, no_hand, not_maps, refused};
+pub use pose::Until;
+pub use promise::{Calibrated, Evaluation, LeftOut, Terms, ToPlace, calibrate, calibrate_recorded, evaluate};
+pub use refused::{no_hand, not_maps, refused};
 pub use shape::{Relief, Sample, Shape, samples};
 pub use stated::{Heights, row};
 pub use surface::Surface;
 #[cfg(feature = "train")]
 pub use table::{BareTable, Measured, REACH, bare_table};
-pub use world::{Aimed, Drawn, Real, Standing, Truth, World, standing};
+pub(crate) use world::Drawn;
+pub use world::{Aimed, Real, Standing, Truth, World, standing};
 pub use write::write;
 
 use crate::error::{Error, Result};

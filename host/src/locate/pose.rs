@@ -36,7 +36,7 @@ impl Until {
 
 /// Distance of a pose from the truth.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Off {
+pub(crate) struct Off {
     /// Along x and y, in millimeters.
     pub millimeters: [f64; 2],
     /// In degrees; 0 for what is round.

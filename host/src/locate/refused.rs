@@ -4,9 +4,9 @@ use crate::error::{Error, Kind, Result, problem};
 use palpate_onboard::ModelError;
 
 /// Farthest place and greatest height, in millimeters: a locator keeps no farther ones.
-pub const FARTHEST: f64 = 2_000.0;
+pub(crate) const FARTHEST: f64 = 2_000.0;
 /// Distance below the table at which a finger cannot have stopped, in millimeters.
-pub const BELOW: f64 = 15.0;
+pub(crate) const BELOW: f64 = 15.0;
 
 /// Refuses places and heights in millimeters that no locator keeps.
 pub(super) fn reachable(stated: impl IntoIterator<Item = (&'static str, f64)>) -> Result<()> {

@@ -30,7 +30,7 @@ mod pack;
 mod table;
 
 pub use pack::{compress, decompress, pack, unpack};
-pub use table::{Ghost, Hidden, Pressed};
+pub use table::Hidden;
 
 use crate::capture::Sampler;
 use crate::error::Result;

@@ -16,7 +16,7 @@ mod rows;
 pub use code::Code;
 #[cfg(feature = "locate")]
 pub(crate) use header::whole;
-pub use predict::{inverse_link, predicted_value};
+pub use predict::predicted_value;
 pub use refused::Refused;
 
 use crate::bytes::{ModelError, at, take};

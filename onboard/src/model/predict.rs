@@ -126,7 +126,7 @@ pub fn predicted_value(prediction: Prediction, margin: f32) -> f32 {
 /// Error, relative to the result, where it is no less than 2^-126: [`Link::Exponential`] 1e-7, [`Link::Logistic`] 3e-7,
 /// [`Link::Softplus`] 5e-7, [`Link::Square`] 6e-8. Of a NaN it is NaN. Cost: a power in integers, and a few operations in f32, which
 /// take most of the time on chips without a float unit. Cannot fail.
-pub fn inverse_link(link: Link, margin: f32) -> f32 {
+fn inverse_link(link: Link, margin: f32) -> f32 {
     match link {
         Link::Identity => margin,
         Link::Exponential => exp(margin),

@@ -45,8 +45,7 @@ pub use memory::Memory;
 pub use probe::{Board, Happened, LONGEST_WAIT, LinkFailed, ProbeSettings, ProbeStation};
 pub use record::RECORD_LENGTH;
 pub use serve::{ERRORS_IN_A_ROW, serve, serve_with};
-pub use session::{PROGRAM, Station};
+pub use session::Station;
 pub use storage::{Loaded, NoStorage, NotStored, Place, Storage};
-pub use table::Locates;
 #[cfg(feature = "locate")]
 pub use table::Table;

@@ -14,7 +14,7 @@ use palpate_shared::link::PlaceMessage;
 use palpate_shared::link::{ApproachMessage, Detail, Device, ModelInfo, POSE_BYTES, Refusal, VerdictMessage, checksum};
 
 /// Default name of programs on the link: this crate and its version.
-pub const PROGRAM: &str = concat!("palpate-onboard ", env!("CARGO_PKG_VERSION"));
+pub(crate) const PROGRAM: &str = concat!("palpate-onboard ", env!("CARGO_PKG_VERSION"));
 
 /// Model in use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -192,7 +192,7 @@ impl<'m, const N: usize, S: Storage, L: Locates> Station<'m, N, S, L> {
     /// # Errors
     /// [`Refusal::NoModel`] without a usable model; [`Refusal::NoPose`], [`Refusal::NotDown`], or [`Refusal::Position`] with a model
     /// of trees: [`Station::refused`] counts those.
-    pub fn press(&mut self, touch: &Touch, position: [i32; 3], detail: bool) -> Result<VerdictMessage, Refusal> {
+    pub(crate) fn press(&mut self, touch: &Touch, position: [i32; 3], detail: bool) -> Result<VerdictMessage, Refusal> {
         let bytes = bytes_at(self.built_in, &self.storage, self.source);
         let pressed = self.located.press(bytes, touch, position, detail);
         // Without maps it says that there is no model.
@@ -210,11 +210,6 @@ impl<'m, const N: usize, S: Storage, L: Locates> Station<'m, N, S, L> {
     /// True if the touches so far have decided; no further one counts before a reset.
     pub(crate) fn has_decided(&self) -> bool {
         self.state.as_ref().is_some_and(|state| state.verdict() != Verdict::Undecided)
-    }
-
-    /// Number of touches, since power-up, that were not counted because the model was not trained for them.
-    pub const fn refused(&self) -> u32 {
-        self.refused
     }
 
     /// The storage again.

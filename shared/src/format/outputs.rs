@@ -8,9 +8,6 @@ pub struct Outputs<'a> {
 }
 
 impl<'a> Outputs<'a> {
-    /// Bytes before the records, and of each.
-    pub const RECORD: usize = 4;
-
     /// Hands the section's content to `put`: for each output the number of its object, and its share of the object's prior.
     pub fn write(outputs: impl Iterator<Item = (u8, f64)> + Clone, put: &mut impl FnMut(&[u8])) {
         let (mut most, mut count, mut last) = (0_u16, 0_u16, None);

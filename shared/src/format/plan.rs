@@ -48,7 +48,7 @@ impl<'a> Plan<'a> {
     }
 
     /// The number of a pair of two different objects: (0, 1), (0, 2), (1, 2), (0, 3) and so on, in any order of the two.
-    pub const fn pair(a: usize, b: usize) -> usize {
+    pub(crate) const fn pair(a: usize, b: usize) -> usize {
         let (low, high) = if a < b { (a, b) } else { (b, a) };
         Self::pairs(high).saturating_add(low)
     }

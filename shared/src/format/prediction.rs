@@ -51,7 +51,7 @@ const OWN_SCALES: u8 = 0x40;
 
 impl Prediction {
     /// Bytes of the section where margins are not divided, nor have scales of their own.
-    pub const LENGTH: usize = 8;
+    pub(crate) const LENGTH: usize = 8;
 
     /// Hands the section's content to `put`; `scales` are those of all outputs, or none.
     pub fn write(self, scales: &[OutputScale], put: &mut impl FnMut(&[u8])) {
@@ -131,7 +131,7 @@ pub struct Sentinel {
 
 impl Sentinel {
     /// Bytes of the section.
-    pub const LENGTH: usize = 8;
+    pub(crate) const LENGTH: usize = 8;
 
     /// The section's content.
     pub fn to_bytes(self) -> [u8; Self::LENGTH] {

@@ -106,7 +106,7 @@ impl PromisedNoise {
 
 impl Promise {
     /// Bytes of the section at least.
-    pub const LENGTH: usize = 48;
+    pub(crate) const LENGTH: usize = 48;
     /// Bytes of the section with all noise.
     pub(crate) const FULL_LENGTH: usize = 84;
     /// Bytes of the section with all noise, in which every finger misses another share of its contacts.
@@ -115,7 +115,7 @@ impl Promise {
     pub(crate) const LOCATED_LENGTH: usize = 104;
 
     /// Bytes of the section with this noise: one of the four lengths.
-    pub fn length(noise: &PromisedNoise) -> usize {
+    pub(crate) fn length(noise: &PromisedNoise) -> usize {
         if noise.position > 0 || noise.drift != [0; 2] {
             return Self::LOCATED_LENGTH;
         }
@@ -213,7 +213,7 @@ pub struct Temperature {
 
 impl Temperature {
     /// Bytes of the section.
-    pub const LENGTH: usize = 4;
+    pub(crate) const LENGTH: usize = 4;
     /// A temperature of 1: it changes no posterior.
     pub const ONE: Self = Self { sharpness: 1 << 16 };
     /// The least and the largest [`sharpness`](Temperature::sharpness): those of temperatures of 16 and 1/16.

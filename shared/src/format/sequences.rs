@@ -68,7 +68,7 @@ pub enum Fault {
 
 impl Limits {
     /// Bytes of a feature.
-    pub const LENGTH: usize = 12;
+    pub(crate) const LENGTH: usize = 12;
     /// The flag of a feature that may be missing, beside the most equal rows.
     const MAY_MISS: u32 = 1 << 31;
     /// Limits that every value keeps.

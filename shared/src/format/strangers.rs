@@ -105,7 +105,7 @@ const fn flag(byte: u8) -> Option<bool> {
 
 impl MisfitTerms {
     /// Bytes in the section.
-    pub const LENGTH: usize = 32;
+    pub(crate) const LENGTH: usize = 32;
 
     /// Returns the bytes of the section.
     pub fn to_bytes(&self) -> [u8; Self::LENGTH] {
@@ -135,7 +135,7 @@ impl<'a> MisfitTest<'a> {
     pub const MOST_RIVALS: usize = 16;
 
     /// Bytes of one object's record, with this many rivals.
-    pub const fn record_length(rivals: usize) -> usize {
+    pub(crate) const fn record_length(rivals: usize) -> usize {
         // A header of 8, rivals, means, slopes and a lower triangle.
         let length = 8 + rivals.next_multiple_of(2) + 2 * (2 * rivals + rivals * (rivals + 1) / 2);
         length.next_multiple_of(4)

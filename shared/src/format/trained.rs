@@ -169,7 +169,7 @@ pub struct TrainedTouches {
 
 impl TrainedTouches {
     /// Bytes of the section.
-    pub const LENGTH: usize = 8;
+    pub(crate) const LENGTH: usize = 8;
 
     /// Full touches only, without a limit of their spread: what a model without this section was trained on.
     pub const fn full(needs_pose: bool) -> Self {
@@ -237,7 +237,7 @@ pub struct PatternShares(
 
 impl PatternShares {
     /// Bytes of the section.
-    pub const LENGTH: usize = 12;
+    pub(crate) const LENGTH: usize = 12;
 
     /// The section's content.
     pub fn to_bytes(self) -> [u8; Self::LENGTH] {

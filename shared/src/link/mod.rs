@@ -61,7 +61,7 @@ pub use message::{
 pub const CHUNK: usize = 256;
 
 /// The most bytes of a name or of a program's name and version.
-pub const TEXT: usize = 128;
+pub(crate) const TEXT: usize = 128;
 
 /// Events that the chip keeps until the host has heard them.
 pub const EVENTS: u32 = 4;

@@ -44,9 +44,7 @@ pub mod sweep;
 pub mod unit;
 
 pub use approach::{Aim, Approach, Probe};
-pub use scene::{Scene, Table};
+pub use scene::Scene;
 
 /// The vectors in this room's signatures: [`DVec3`](glam::DVec3) for positions and directions, in units.
 pub use glam;
-/// The generators in this room's signatures: [`Approach::draw`] takes any [`Rng`](rand::Rng).
-pub use rand;

@@ -280,7 +280,7 @@ pub(crate) fn round_leaves(ensemble: &mut Ensemble, bits: u32) {
 
 /// True if [rounding](Settings::leaf_bits) to this many bits changes no leaf: a compiled model then loses nothing in leaves of
 /// that width.
-pub fn is_rounded(ensemble: &Ensemble, bits: u32) -> bool {
+pub(crate) fn is_rounded(ensemble: &Ensemble, bits: u32) -> bool {
     let unit = leaf_unit(ensemble, bits);
     leaves(ensemble).all(|value| (value / unit).fract() == 0.0)
 }

@@ -112,7 +112,7 @@ impl Memory {
 
 /// Features of palpate-onboard that models need, and the bytes of flash of each on a Cortex-M4F and a Cortex-M0+, beyond
 /// what all of them have: `verdict` images of the firmware, which the ignored tests of `tests/tests/whole/images.rs` compare.
-pub const FEATURES: [(&str, [usize; 2]); 12] = [
+pub(crate) const FEATURES: [(&str, [usize; 2]); 12] = [
     ("compact", [364, 424]),
     ("wide", [392, 424]),
     ("code", [600, 220]),

@@ -148,7 +148,7 @@ pub fn thresholds(model: &Model<'_>) -> Vec<i32> {
 }
 
 /// The farthest that an output's margin can be from the library's own.
-pub fn bound_of(model: &Model<'_>, output: usize) -> f64 {
+pub(crate) fn bound_of(model: &Model<'_>, output: usize) -> f64 {
     let scale = model.output_scale(output).map_or(model.prediction().scale, |own| own.scale);
     f64::from(model.margin_error()) * f64::from(scale)
 }

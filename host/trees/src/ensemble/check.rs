@@ -9,7 +9,7 @@ use std::collections::HashSet;
 /// The most objects that a compiled model can distinguish.
 pub const MAX_OBJECTS: usize = 256;
 /// The most features that a compiled model can have.
-pub const MAX_FEATURES: usize = 256;
+pub(crate) const MAX_FEATURES: usize = 256;
 
 impl Ensemble {
     /// Checks an ensemble that was put together by hand: 2 to 256 objects (over rows of 1 to 256 features also one) with

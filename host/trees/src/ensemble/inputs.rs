@@ -60,7 +60,7 @@ impl Inputs {
     }
 
     /// The schema of features that the model computes; none of rows.
-    pub fn schema(&self) -> Option<&Schema> {
+    pub(crate) fn schema(&self) -> Option<&Schema> {
         match self {
             Self::Computed(schema) => Some(schema),
             Self::Rows(_) => None,

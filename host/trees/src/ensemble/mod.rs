@@ -14,13 +14,14 @@ mod origin;
 mod values;
 mod xgboost;
 
-pub(crate) use check::check_leaf;
-pub use check::{MAX_FEATURES, MAX_OBJECTS, check_names};
+pub(crate) use check::{MAX_FEATURES, check_leaf};
+pub use check::{MAX_OBJECTS, check_names};
 #[cfg(test)]
 pub(crate) use inputs::computed;
 pub use inputs::{Inputs, Occurring, Schema};
 pub use nodes::Threshold;
-pub use origin::{Columns, Exact, Imported, Probability, Provenance};
+pub(crate) use origin::{Columns, Exact, Imported};
+pub use origin::{Probability, Provenance};
 pub(crate) use values::TOLERATED;
 
 use palpate_shared::format::Prediction;
@@ -95,7 +96,7 @@ impl Tree {
     ///
     /// # Panics
     /// If a child's or a feature's index is out of range, which [`Ensemble::check`] rules out.
-    pub fn leaf(&self, features: &[f32]) -> &[f32] {
+    pub(crate) fn leaf(&self, features: &[f32]) -> &[f32] {
         self.nodes[self.leaf_node(features)].leaf().unwrap_or_default()
     }
 

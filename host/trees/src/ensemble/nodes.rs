@@ -19,7 +19,7 @@ impl Threshold {
     }
 
     /// The test `x < value`.
-    pub const fn below(value: f64) -> Self {
+    pub(crate) const fn below(value: f64) -> Self {
         Self { value, inclusive: false }
     }
 
@@ -45,7 +45,7 @@ impl Threshold {
     }
 
     /// The least whole number of units that goes right, where `scale` units make up 1.
-    pub fn units(self, scale: f32) -> f64 {
+    pub(crate) fn units(self, scale: f32) -> f64 {
         let units = self.value * f64::from(scale);
         // A product within rounding of a whole number is that number.
         let whole = units.round();

@@ -17,7 +17,7 @@ impl Output {
 
 impl Ensemble {
     /// True if outputs are values over rows: a regression or a ranking.
-    pub fn is_regression(&self) -> bool {
+    pub(crate) fn is_regression(&self) -> bool {
         self.schema().is_none() && (self.objects.len() == 1 || self.prediction().targets)
     }
 

@@ -6,7 +6,7 @@
 mod gaps;
 mod parts;
 
-pub use parts::Part;
+pub(crate) use parts::Part;
 
 use super::exact::FINE;
 use crate::mesh::Mesh;

@@ -34,7 +34,7 @@ use glam::{DMat3, DVec3, I64Vec3, Vec3};
 pub(crate) const SAME: f64 = 10.0;
 
 /// Placements of less weight are left out, except the second of an object that would have only one.
-pub const LEAST: f64 = 0.03;
+pub(crate) const LEAST: f64 = 0.03;
 
 /// The second placement of an object is left out if it has less weight than this, regardless of the others.
 pub(crate) const LEAST_OF_TWO: f64 = 0.01;

@@ -150,11 +150,6 @@ impl Noise {
         self.speed_bias > 0.0 || self.pose_bias > 0.0
     }
 
-    /// True if it can turn a contact into a missing one.
-    pub fn misses(&self) -> bool {
-        self.missed.iter().any(|share| *share > 0.0) || !self.grazing.is_none()
-    }
-
     /// Statement of a compiled model about it. A robot's bias counts as noise of the pose: in training, every touch is
     /// made by a robot of its own.
     pub fn trained(&self) -> TrainedNoise {

@@ -72,11 +72,6 @@ impl Surface {
         self.triangles.iter().map(|triangle| triangle.map(|corner| corner * self.unit + self.center))
     }
 
-    /// The mesh's bounding box: its lowest and highest corner.
-    pub fn bounds(&self) -> [DVec3; 2] {
-        [self.center - self.half * self.unit, self.center + self.half * self.unit]
-    }
-
     /// The first time t ≥ 0 at which a sphere of this radius (greater than 0), centered at origin + t · direction, touches
     /// the surface; 0 when it starts in contact, none when it never does. The direction need not have unit length;
     /// without a direction (zero, or not finite) only a contact at the start counts.

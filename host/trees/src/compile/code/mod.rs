@@ -13,7 +13,7 @@ mod rust;
 #[cfg(test)]
 pub(crate) mod tests;
 
-pub use program::Program;
+pub(crate) use program::Program;
 pub(super) use program::Statements;
 
 impl Program {
