@@ -55,8 +55,6 @@ pub use cost_of_noise::{CostOfNoise, LEAST as LEAST_FOR_COST, cost_of_noise};
 pub use curve::{Confidence, Curve};
 pub(crate) use margins::OfTouches;
 pub use margins::{Margins, delivered};
-#[cfg(feature = "train")]
-pub(crate) use margins::{best, leading};
 pub use measure::{Evaluated, Wanted, measure, own_weights};
 #[cfg(feature = "train")]
 pub(crate) use noisy::ROBOTS;
