@@ -18,6 +18,7 @@ use palpate::progress::Progress;
 use palpate::rows::{Features, SequenceColumns};
 use palpate::stream;
 use palpate::touches::Dataset;
+use palpate::wording::percent_within;
 use palpate::{Error, Result};
 use palpate_shared::format::Counted;
 use std::fmt::Write as _;
@@ -202,9 +203,8 @@ fn rows(directory: &Path, arguments: &Arguments, file: &ModelFile, label: &str, 
         // Writing to a string cannot fail.
         _ = writeln!(
             text,
-            "{rows} rows, each taken alone: {:.1} % right (± {:.1}, a standard error)",
-            100.0 * accuracy,
-            100.0 * accuracy_standard_error
+            "{rows} rows, each taken alone: {} right (± is a standard error)",
+            percent_within(accuracy, accuracy_standard_error, 1)
         );
         text += &shares_table("Taken for", &names, &names, &confusion);
     }

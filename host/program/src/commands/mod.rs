@@ -15,7 +15,6 @@ mod keys;
 mod link;
 mod maps;
 mod numbers;
-mod parity;
 mod plan;
 mod play;
 mod probe;
@@ -419,11 +418,6 @@ fn option_of(setting: &str) -> &str {
         "scales" => "scale",
         other => other,
     }
-}
-
-/// A share in percent, as it was meant: without the last bits.
-fn percent(share: f64) -> f64 {
-    (share * 1e9).round() / 1e7
 }
 
 /// Reads a data set; its warnings go to stderr.

@@ -3,7 +3,6 @@
 use super::Global;
 use super::expected::ExpectedArguments;
 use super::recognize_lines::{Event, Line, each_of};
-use super::recognize_rows::verdict_name;
 use palpate::error::Kind;
 use palpate::locate::{self, Approach, Hand, Locating, Maps, MapsFile, POSE, Pose};
 use palpate::output;
@@ -195,7 +194,7 @@ impl<'m> Stream<'m> {
         let posterior = self.locating.posteriors().get(best).copied().unwrap_or(0.0);
         let line = Line {
             touch: self.touches,
-            verdict: verdict_name(verdict),
+            verdict: verdict.name(),
             object: if self.touches == 0 { "" } else { self.maps.object_name(best) },
             posterior,
             refused,

@@ -7,6 +7,7 @@ use palpate::evaluate::verify::margins;
 use palpate::output;
 use palpate::rows::{Encoder, Features, RowOf, SequencesBuilder};
 use palpate::stream::refusal;
+use palpate::wording::rate;
 use palpate_onboard::{Recognizer, RowsSeen, Verdict};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -53,16 +54,6 @@ pub(super) struct Asked<'a> {
     pub(super) weights: Option<Vec<u32>>,
 }
 
-/// Name of a verdict in results.
-pub(super) fn verdict_name(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::Undecided => "undecided",
-        Verdict::Recognized { .. } => "recognized",
-        Verdict::Unknown => "unknown",
-        Verdict::GaveUp => "gave-up",
-    }
-}
-
 /// Starts a recognizer again, with these weights if there are any.
 pub(super) fn reset(recognizer: &mut Recognizer<'_, 256>, weights: Option<&[u32]>) {
     match weights {
@@ -86,10 +77,10 @@ pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, asked: &Asked<'_
     let starts = starts(&rows.labels).map_err(|error| error.in_file(path))?;
     if let Some(promise) = model.promise().filter(|_| adds_up && sequence.is_none()) {
         super::remark(&format!(
-            "palpate: note: {}: nothing says where a sequence ends (--sequence-column), so the promise of {} % is for the first \
+            "palpate: note: {}: nothing says where a sequence ends (--sequence-column), so the promise of {} is for the first \
              verdict alone, and none is made for those after it",
             path.display(),
-            super::percent(promise.rate)
+            rate(promise.rate)
         ));
     }
     let encoder = if adds_up { Encoder::measured(&model) } else { Encoder::of(&model) };
@@ -122,7 +113,7 @@ pub(super) fn run(recognizer: Recognizer<'_, 256>, path: &Path, asked: &Asked<'_
         let line = Line {
             row: number,
             sequence: rows.labels.get(number - 1).map(String::as_str),
-            verdict: (has_classes && adds_up).then(|| verdict_name(recognizer.verdict())),
+            verdict: (has_classes && adds_up).then(|| recognizer.verdict().name()),
             class: has_classes.then(|| model.object_name(class)),
             posterior: has_classes.then(|| recognizer.posterior(class).to_f64()),
             rows: (has_classes && adds_up).then(|| recognizer.touches()),

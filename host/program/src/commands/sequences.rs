@@ -9,7 +9,7 @@ use palpate::evaluate::Finding;
 use palpate::output;
 use palpate::rows::{Features, SequenceColumns, Sequences};
 use palpate::stream::{self, Evaluated};
-use palpate::wording;
+use palpate::wording::{self, percent, rate};
 use palpate_onboard::Model;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -69,10 +69,6 @@ pub(crate) fn others(path: &Path, model: &Model<'_>, columns: &SequenceColumns<'
     read_of(path, model, &columns, &[String::new()])
 }
 
-fn percent(share: f64) -> String {
-    format!("{:.2} %", 100.0 * share)
-}
-
 /// An evaluation on sequences of rows.
 pub(crate) struct Evaluation<'a> {
     pub(crate) model: &'a Path,
@@ -122,10 +118,10 @@ fn evaluated_text(evaluated: &Evaluated) -> String {
         "{sequences} sequences{groups}, {rows} rows{refused}\n\
          of the names given {} wrong; of all sequences {} wrong, {} undecided, {} unknown\n\
          {mean_rows:.1} rows to the end on average, half of the sequences within {median_rows}\n",
-        percent(*error),
-        percent(*wrong),
-        percent(*undecided),
-        percent(*unknown),
+        percent(*error, 2),
+        percent(*wrong, 2),
+        percent(*undecided, 2),
+        percent(*unknown, 2),
     );
     if let Some(promise) = &evaluated.promise {
         let of = promise.of.as_ref().map_or_else(String::new, |of| format!(" ({of})"));
@@ -137,9 +133,9 @@ fn evaluated_text(evaluated: &Evaluated) -> String {
         // Writing to a string cannot fail.
         _ = writeln!(
             text,
-            "promised: at most {} % wrong; {} were{of}{groups}: {}",
-            super::percent(promise.promised),
-            percent(promise.found),
+            "promised: at most {} wrong; {} were{of}{groups}: {}",
+            rate(promise.promised),
+            percent(promise.found, 2),
             found(promise.finding, "no name was given"),
         );
     }
