@@ -93,7 +93,7 @@ part_scenes() { # placements of the bowl; shares of approaches that touch, float
     stated docs/guide/scenes.md "$placements"
     touching() { # of all, and of the flat ones: options of capture
         "$palpate" capture meshes -o touched --approaches 6000 --force "$@" 2>>log |
-            awk '$1 == "all" { all = $3 } /^(fork|spoon|scissors|paperclip) / { flat += $3; count++ }
+            awk '$1 == "all" { all = $4 } /^(fork|spoon|scissors|paperclip) / { flat += $4; count++ }
                 END { printf "%.0f %.0f\n", all, flat / count }'
     }
     # Once, since that takes longer than to touch them.

@@ -1,6 +1,6 @@
 //! Results: rows of values under named columns, which become aligned text, JSON, or a page's table.
 
-use crate::wording::decimal;
+use crate::wording::{decimal, percent, percent_within};
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
 
@@ -72,10 +72,9 @@ impl Value {
             Self::Spread(value, spread, decimals) => {
                 format!("{} ± {}", decimal(value, decimals), decimal(spread, decimals))
             }
-            Self::Percent(value, _) if !value.is_finite() => Self::Missing.shown(),
-            Self::Percent(value, decimals) => format!("{}\u{a0}%", decimal(value * 100.0, decimals)),
+            Self::Percent(value, decimals) => percent(value, decimals).replace(" %", "\u{a0}%"),
             Self::PercentSpread(value, spread, decimals) => {
-                format!("{} ± {}\u{a0}%", decimal(value * 100.0, decimals), decimal(spread * 100.0, decimals))
+                percent_within(value, spread, decimals).replace(" %", "\u{a0}%")
             }
             Self::Missing => "–".to_owned(),
         }
@@ -92,12 +91,13 @@ impl Value {
     }
 }
 
-/// A number, a number with its uncertainty in a list, a string, or null.
+/// A number (a whole one of a count), a number with its uncertainty in a list, a string, or null.
 impl Serialize for Value {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match (self, self.numbers()) {
             (Self::Text(text), _) => text.serialize(serializer),
             (Self::Spread(..) | Self::PercentSpread(..), numbers) => numbers.serialize(serializer),
+            (Self::Number(_, 0), (Some(count), _)) if count.fract() == 0.0 => (count as i64).serialize(serializer),
             (_, (number, _)) => number.serialize(serializer),
         }
     }
@@ -208,7 +208,7 @@ mod tests {
         assert_eq!(
             serde_json::to_value(&results).unwrap(),
             serde_json::json!([
-                {"object": "ladle", "touches": 1_234.0, "right": [0.5, 0.25]},
+                {"object": "ladle", "touches": 1_234, "right": [0.5, 0.25]},
                 {"object": "fork", "touches": null, "right": 1.0},
             ])
         );

@@ -54,6 +54,21 @@ pub fn percent(share: f64, decimals: usize) -> String {
     }
 }
 
+/// A share of one and its uncertainty in percent, with this many decimals.
+///
+/// ```
+/// assert_eq!(palpate_base::wording::percent_within(0.907, 0.025, 1), "90.7 ± 2.5 %");
+/// ```
+pub fn percent_within(share: f64, uncertainty: f64, decimals: usize) -> String {
+    format!("{} ± {}", decimal(100.0 * share, decimals), percent(uncertainty, decimals))
+}
+
+/// Names with their shares in percent: "bowl 1.5 %, fork 98.5 %".
+pub fn shares<S: AsRef<str>>(shares: impl IntoIterator<Item = (S, f64)>) -> String {
+    let named = |(name, share): (S, f64)| format!("{} {}", name.as_ref(), percent(share, 1));
+    shares.into_iter().map(named).collect::<Vec<_>>().join(", ")
+}
+
 /// A share of one that somebody chose, in percent as it was meant, without the last bits: 0.07 is "7 %".
 ///
 /// ```
@@ -146,6 +161,7 @@ mod tests {
         ] {
             assert_eq!(decimal(value, decimals), text);
         }
+        assert_eq!(shares([("bowl", 0.015), ("fork", 0.985)]), "bowl 1.5 %, fork 98.5 %");
         assert_eq!([count(7_u8), count(1_234_u16), count(1_234_567_u32)], ["7", "1,234", "1,234,567"]);
         assert_eq!([percent(0.123, 1), percent(-0.000_1, 1), percent(f64::NAN, 1)], ["12.3 %", "0.0 %", "–"]);
         assert_eq!(

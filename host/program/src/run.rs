@@ -367,34 +367,16 @@ impl Trial {
         let margins = Margins::new(&model, &split.test)?;
         let fewest = margins.fewest_touches();
         let seed = settings.capture.origin.seed;
-        let mut evaluation = evaluate::evaluate(
-            &margins,
-            &with!(
-                evaluate::Settings::default(),
-                at = AT.into_iter().filter(|&at| distinct_groups(fewest, at) >= LEAST_GROUPS).collect(),
-                at_approaches = Vec::new(),
-                groups = settings.groups,
-                error_rate = None,
-                max_touches = None,
-                seed,
-                noise = settings.noise
-            ),
-        )?;
+        let evaluated = |margins: &Margins<'_>, at: Vec<usize>, at_approaches: Vec<usize>| {
+            let (groups, noise) = (settings.groups, settings.noise);
+            let own = evaluate::Settings::default();
+            evaluate::evaluate(margins, &with!(own, at, at_approaches, groups, seed, noise))
+        };
+        let at = AT.into_iter().filter(|&at| distinct_groups(fewest, at) >= LEAST_GROUPS);
+        let mut evaluation = evaluated(&margins, at.collect(), Vec::new())?;
         let approached = Margins::new(&model, approaches)?;
-        let fewest_approaches = approached.fewest_approaches();
-        let by_approach = evaluate::evaluate(
-            &approached,
-            &with!(
-                evaluate::Settings::default(),
-                at = Vec::new(),
-                at_approaches = AT_APPROACHES.into_iter().filter(|&at| at <= fewest_approaches).collect(),
-                groups = settings.groups,
-                error_rate = None,
-                max_touches = None,
-                seed,
-                noise = settings.noise
-            ),
-        )?;
+        let at = AT_APPROACHES.into_iter().filter(|&at| at <= approached.fewest_approaches());
+        let by_approach = evaluated(&approached, Vec::new(), at.collect())?;
         evaluation.approaches = by_approach.approaches;
         let curve = margins.curve(MOST.min(largest_group(fewest)), settings.groups, seed)?;
         stages.end(format!("{name}: testing"));

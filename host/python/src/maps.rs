@@ -14,7 +14,6 @@ use palpate::error::Error;
 use palpate::locate::{self, Aimed, Approach, Hand, Heights, MapsFile, Promised, Seen, Settings, Terms, Until};
 use palpate::mesh::Object;
 use palpate::mesh::facts::sides;
-use palpate::onboard::Verdict;
 use palpate::output;
 use palpate::touches::{located, touch_of_seconds};
 use palpate::with;
@@ -22,7 +21,7 @@ use pyo3::inspect::PyStaticExpr;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyBytes, PyType};
-use pyo3::{Borrowed, intern, type_hint_identifier};
+use pyo3::{Borrowed, type_hint_identifier};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -567,12 +566,6 @@ impl Locator {
         static LOCATED: PyOnceLock<Py<PyType>> = PyOnceLock::new();
         static MODE: PyOnceLock<Py<PyType>> = PyOnceLock::new();
         let (maps, locating) = (self.cell.borrow_owner().borrow_dependent(), self.cell.borrow_dependent());
-        let state = match locating.verdict() {
-            Verdict::Recognized { .. } => intern!(py, "recognized"),
-            Verdict::Unknown => intern!(py, "unknown"),
-            Verdict::GaveUp => intern!(py, "gave-up"),
-            _ => intern!(py, "undecided"),
-        };
         let best = locating.best();
         let degrees = |turn: u16| f64::from(turn) * 360.0 / 65_536.0;
         let mode = class(py, "Mode", &MODE)?;
@@ -589,7 +582,7 @@ impl Locator {
         let posterior = locating.posteriors().get(best).copied().unwrap_or(0.0);
         let modes = pyo3::types::PyTuple::new(py, modes)?;
         let made = class(py, "Located", &LOCATED)?.call1((
-            state,
+            locating.verdict().name(),
             maps.object_name(best),
             posterior,
             locating.touches(),

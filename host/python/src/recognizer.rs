@@ -17,7 +17,7 @@ use pyo3::inspect::PyStaticExpr;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyList, PyString, PyTuple, PyType};
-use pyo3::{Borrowed, intern, type_hint_identifier};
+use pyo3::{Borrowed, type_hint_identifier};
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -206,23 +206,10 @@ impl Recognizer {
                 let object = usize::from(object);
                 let (posterior, share) = recognizer.posterior_together(object);
                 let (posterior, share) = (posterior.to_f64(), share.to_f64());
-                class.call1((
-                    intern!(py, "recognized"),
-                    self.names[object].bind(py),
-                    posterior,
-                    touches,
-                    refused,
-                    share,
-                ))?
+                let name = self.names[object].bind(py);
+                class.call1((verdict.name(), name, posterior, touches, refused, share))?
             }
-            other => {
-                let state = match other {
-                    Verdict::Unknown => intern!(py, "unknown"),
-                    Verdict::GaveUp => intern!(py, "gave-up"),
-                    _ => intern!(py, "undecided"),
-                };
-                class.call1((state, py.None(), py.None(), recognizer.touches(), refused))?
-            }
+            other => class.call1((other.name(), py.None(), py.None(), recognizer.touches(), refused))?,
         };
         Ok(objects::Verdict(made))
     }

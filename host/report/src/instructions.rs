@@ -52,25 +52,23 @@ impl Instructions {
         Self { m4f, m0_plus: count(m0_plus, estimate.m0_plus.unwrap_or_else(by_ratio)) }
     }
 
-    /// Source of the numbers, as sentences.
+    /// Source of the numbers, as a sentence.
     pub(super) fn explanation(self) -> String {
-        let measured = "counted while emulated chips ran the compiled models";
+        let [m4f, m0_plus] = [self.m4f, self.m0_plus].map(|count| match count.measured {
+            true => "counted while an emulated chip ran the compiled models",
+            false => "the compiler's estimate",
+        });
         let chip = if self.m4f.measured { Chip::M0Plus } else { Chip::M4F };
-        let missing = chip.obstacle().map_or_else(String::new, |problem| format!("{}; ", problem.what()))
-            + "onboard/firmware says how to build what is needed";
-        let m0_plus = "the compiler's estimate";
-        match (self.m4f.measured, self.m0_plus.measured) {
-            (true, true) => format!("Instructions, from contact times to margins, were {measured}."),
-            (true, false) => format!(
-                "Instructions on a Cortex-M4F, from contact times to margins, were {measured}; those on a Cortex-M0+ are \
-                 {m0_plus} ({missing})."
+        let missing = match self.m4f.measured && self.m0_plus.measured {
+            true => String::new(),
+            false => format!(
+                " ({}onboard/firmware says how to build what is needed)",
+                chip.obstacle().map_or_else(String::new, |problem| format!("{}; ", problem.what()))
             ),
-            (false, true) => format!(
-                "Instructions on a Cortex-M0+, from contact times to margins, were {measured}; those on a Cortex-M4F are \
-                 the compiler's estimate ({missing})."
-            ),
-            (false, false) => format!("Instructions, from contact times to margins, are {m0_plus} ({missing})."),
-        }
+        };
+        format!(
+            "Instructions, from contact times to margins, are {m4f} on a Cortex-M4F and {m0_plus} on a Cortex-M0+{missing}."
+        )
     }
 }
 

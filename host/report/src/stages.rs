@@ -12,10 +12,8 @@ use palpate::progress::{self, Progress};
 use palpate::results::Results;
 use palpate::row;
 use palpate::wording::count;
-use serde::Serialize;
 use serde_json::json;
 use std::cell::OnceCell;
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
@@ -127,19 +125,17 @@ pub fn report(
         facts: facts(settings, &stages, began.elapsed().as_secs_f64()),
         files: true,
     };
-    let mut files = Vec::new();
-    let everything = Everything {
-        made_from: &made_from,
-        settings,
-        version: env!("CARGO_PKG_VERSION"),
-        tables: page.tables(),
-        stages: &stages,
-    };
+    let summary = json!({
+        "made_from": made_from,
+        "settings": settings,
+        "version": env!("CARGO_PKG_VERSION"),
+        "tables": page.tables(),
+        "stages": stages,
+    });
     let path = directory.join("summary.json");
-    write_json(&path, &everything)?;
-    files.push(path);
+    write_json(&path, &summary)?;
+    let mut files = vec![path];
     files.extend(page.write(&directory.join("index.html"))?);
-    let summary = results::json("summary", &everything)?;
     Ok(Report { files, stages, sentence, summary })
 }
 
@@ -198,18 +194,6 @@ fn shortened(settings: &Settings) -> Option<Figure> {
     }
     let caption = "All other numbers are those of a full report.";
     (!numbers.is_empty()).then(|| Figure::new("shortened", "What --quick shortens", caption, data))
-}
-
-/// Contents of `summary.json`.
-#[derive(Serialize)]
-struct Everything<'a> {
-    /// Settings and objects that another report must have been made from for this one to replace it unasked.
-    made_from: &'a serde_json::Value,
-    settings: &'a Settings,
-    version: &'a str,
-    /// The page's tables.
-    tables: BTreeMap<&'a str, &'a Results>,
-    stages: &'a [(String, f64)],
 }
 
 /// Settings, version and times for the page's foot.

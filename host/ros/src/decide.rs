@@ -1,6 +1,6 @@
 //! From touches to verdicts, without DDS: messages in, messages out.
 
-use crate::follow::{Following, Step, UNDECIDED};
+use crate::follow::{Following, Step};
 use crate::place::Placing;
 use crate::served::Served;
 use crate::thresholds::Thresholds;
@@ -108,13 +108,12 @@ impl Decider {
         let following = &self.following;
         let (touch, objects, posteriors) = (following.touches(), following.names(), following.posteriors());
         let evidence = Some(Evidence { touch, objects: objects.clone(), nats: behind(&posteriors) });
-        let (verdict, best) = match following.verdict() {
-            Decision::Undecided => (UNDECIDED, following.best()),
-            Decision::Recognized { object, .. } => ("recognized", object.into()),
-            Decision::Unknown => ("unknown", following.best()),
-            Decision::GaveUp => ("gave-up", following.best()),
+        let verdict = following.verdict();
+        let best = match verdict {
+            Decision::Recognized { object, .. } => object.into(),
+            _ => following.best(),
         };
-        let verdict = Verdict { touch, verdict: verdict.into(), objects, ..Verdict::default() };
+        let verdict = Verdict { touch, verdict: verdict.name().into(), objects, ..Verdict::default() };
         let mut step = Step { verdict: with_best(verdict, best, posteriors), evidence, ..Step::default() };
         following.complete(&mut step);
         step

@@ -34,7 +34,7 @@ impl Step {
 }
 
 /// The verdict while nothing is decided.
-pub(crate) const UNDECIDED: &str = "undecided";
+pub(crate) const UNDECIDED: &str = Decision::Undecided.name();
 
 /// Follows the touches of one object.
 pub(crate) trait Following {

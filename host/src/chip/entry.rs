@@ -1,6 +1,7 @@
 //! Events of a link, as lines of JSON for programs and lines of text for people.
 
 use super::{ChipModel, Update};
+use crate::wording::percent;
 use palpate_shared::Pose;
 use palpate_shared::link::{ApproachMessage, Decision, Event};
 use serde::Serialize;
@@ -130,7 +131,7 @@ impl fmt::Display for Entry {
                 }
                 write!(f, "perhaps {best}")?;
                 match posteriors.as_ref().and_then(|p| p.iter().copied().reduce(f64::max)) {
-                    Some(posterior) => write!(f, " {:.1} %", 100.0 * posterior),
+                    Some(posterior) => write!(f, " {}", percent(posterior, 1)),
                     None => Ok(()),
                 }
             }

@@ -37,6 +37,16 @@ pub enum Verdict {
 }
 
 impl Verdict {
+    /// Its name in lines for programs. Cost: a few instructions; never fails.
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Undecided => "undecided",
+            Self::Recognized { .. } => "recognized",
+            Self::Unknown => "unknown",
+            Self::GaveUp => "gave-up",
+        }
+    }
+
     /// The posterior of the object that was recognized, when it was; `None` if none was.
     ///
     /// Cost: that of [`Rivals::posterior`]. It is that of the evidence as it is, which the threshold is for; for the model's

@@ -123,10 +123,8 @@ impl<'m> Known<'m> {
 
 fn said(verdict: Verdict) -> String {
     match verdict {
-        Verdict::Undecided => "undecided".into(),
         Verdict::Recognized { object, touches, .. } => format!("recognized {object} {touches}"),
-        Verdict::Unknown => "unknown".into(),
-        Verdict::GaveUp => "gave-up".into(),
+        other => other.name().into(),
     }
 }
 

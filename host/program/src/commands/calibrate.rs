@@ -231,12 +231,7 @@ fn in_each_placement(calibrated: &Calibrated) -> String {
     let least = |rate: f64| {
         let names = calibrate::needed(rate, calibrated.confidence);
         let all = names as f64 * placements as f64 * touches / named;
-        format!(
-            "{} % takes {names} names of each and {} {} in all",
-            super::percent(rate),
-            round(all),
-            calibrated.counted
-        )
+        format!("{} takes {names} names of each and {} {} in all", wording::rate(rate), round(all), calibrated.counted)
     };
     let rates = [calibrated.promised, calibrated.promised / 2.0, 2.0 * calibrated.promised];
     let rates: Vec<String> = rates.into_iter().filter(|rate| *rate < 1.0).map(least).collect();
@@ -255,18 +250,17 @@ fn round(number: f64) -> String {
 
 /// Statements about a promise that was tested on recordings.
 fn of_recorded(recorded: &OfRecorded, calibrated: &Calibrated) -> String {
-    let percent = |share: f64| format!("{:.2} %", 100.0 * share);
     let text = format!(
         "Tested on recorded touches, {} approaches to each object or more. Of the simulated names {} are wrong at this threshold.\n",
         recorded.approaches,
-        percent(recorded.simulated_error)
+        wording::percent(recorded.simulated_error, 2)
     );
     match recorded.recordings {
         Some(recordings) => format!(
             "{text}note: the {} sequences are of {recordings} recordings. Sequences of one recording are not independent, so that the \
-             promise may hold with a lower probability than {} %: record on several days.\n",
+             promise may hold with a lower probability than {}: record on several days.\n",
             calibrated.sequences,
-            super::percent(calibrated.confidence)
+            wording::rate(calibrated.confidence)
         ),
         None => text,
     }

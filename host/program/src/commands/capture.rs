@@ -1,3 +1,4 @@
+use super::keys::one_of;
 use super::numbers;
 use super::probe::{SizeArguments, refuse_unstated};
 use super::progress::{Bar, cancel_when_interrupted};
@@ -9,11 +10,10 @@ use palpate::mesh::facts::Facts;
 use palpate::mesh::{BACKGROUND, Object};
 use palpate::output;
 use palpate::probe::approach::Aim;
+use palpate::results::{Results, Value};
 use palpate::touches::{Origin, Samples};
-use palpate::with;
-use palpate::wording::{count, decimal};
-use palpate::{Error, Result};
-use std::fmt::Write as _;
+use palpate::wording::{decimal, percent};
+use palpate::{Error, Result, row, with};
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -83,7 +83,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     if global.json {
         return output::print_json(&summary);
     }
-    let text = if settings.origin.approaches { kept(&summary) } else { table(&summary) };
+    let text = table(&summary, settings.origin.approaches);
     let placements = if settings.origin.scene.is_floating() { String::new() } else { described(&objects)? };
     output::print(&(text + &unreached(&summary, &settings.origin) + &placements))
 }
@@ -102,27 +102,21 @@ pub(super) fn complain(object: &Object) {
 /// Contacts that are missing because the hand had stopped, by finger, and why.
 fn unreached(summary: &Summary, origin: &Origin) -> String {
     let approaches: u64 = summary.objects.iter().map(|object| object.approaches).sum();
-    let percent = |count: u64| 100.0 * count as f64 / approaches.max(1) as f64;
+    let share = |count: u64| percent(count as f64 / approaches.max(1) as f64, 1);
     let mut text = String::new();
     if let Some((stroke, window)) = origin.probe.stroke.zip(origin.probe.window()) {
-        let late = |finger: usize| percent(summary.objects.iter().map(|object| object.late[finger]).sum());
-        // Writing to a string cannot fail.
-        _ = writeln!(
-            text,
-            "Missing since they came later than the stroke of {stroke} ({:.3} s after the first contact): contacts of finger \
-             1 in {:.1} % of the approaches, of finger 2 in {:.1} %, of finger 3 in {:.1} %.",
-            f64::from(window) / 1e6,
-            late(0),
-            late(1),
-            late(2),
+        let [first, second, third] =
+            [0, 1, 2].map(|finger: usize| share(summary.objects.iter().map(|object| object.late[finger]).sum()));
+        text += &format!(
+            "Missing since they came later than the stroke of {stroke} ({} s after the first contact): contacts of finger 1 in {first} \
+             of the approaches, of finger 2 in {second}, of finger 3 in {third}.\n",
+            decimal(f64::from(window) / 1e6, 3),
         );
     }
     if let Some(travel) = origin.probe.travel {
-        let turned_back = percent(summary.objects.iter().map(|object| object.turned_back).sum());
-        _ = writeln!(
-            text,
-            "Missing since the object was farther away than the travel of {travel}: all contacts in {turned_back:.1} % of the \
-             approaches."
+        text += &format!(
+            "Missing since the object was farther away than the travel of {travel}: all contacts in {} of the approaches.\n",
+            share(summary.objects.iter().map(|object| object.turned_back).sum())
         );
     }
     text
@@ -149,7 +143,7 @@ impl Arguments {
 }
 
 pub(super) fn aim(name: &str) -> Result<Aim, String> {
-    Aim::from_name(name).ok_or_else(|| "use one of box, middle, mass".to_owned())
+    one_of(name, Aim::ALL.map(|aim| (aim.name(), aim)))
 }
 
 /// An option's value; what is wrong with it, with what to do.
@@ -174,40 +168,24 @@ pub(super) fn hint(error: &Error, has: &dyn Fn(&str) -> bool) -> Option<String> 
     }
 }
 
-/// Counts of a capture that keeps every approach: none of them has to be a touch.
-fn kept(summary: &Summary) -> String {
-    let width = summary.objects.iter().map(|object| object.name.len()).max().unwrap_or(0).max(6);
-    let mut text = format!("{:width$}  {:>12}  {:>8}  {:>14}\n", "object", "approaches", "touching", "approaches/s");
-    let mut row = |name: &str, approaches: u64, touching: u64, seconds: f64| {
-        let share = 100.0 * touching as f64 / approaches.max(1) as f64;
-        let (approaches, rate) = (count(approaches), decimal(approaches as f64 / seconds, 0));
-        // Writing to a string cannot fail.
-        _ = writeln!(text, "{name:width$}  {approaches:>12}  {share:>7.1}%  {rate:>14}");
+/// Counts of a capture; where every approach was kept, those that touched anything are counted.
+fn table(summary: &Summary, keeps_all: bool) -> String {
+    let counted = if keeps_all { "touching" } else { "touches" };
+    let mut rows = Results::new(["object", counted, "approaches", "share", "approaches/s"]);
+    let mut push = |name: &str, touches: u64, approaches: u64, seconds: f64| {
+        let share = Value::Percent(touches as f64 / approaches.max(1) as f64, 1);
+        rows.push(row![name, touches, approaches, share, Value::Number(approaches as f64 / seconds, 0)]);
     };
+    let touches = |object: &capture::ObjectSummary| if keeps_all { object.touching } else { object.touches };
     for object in &summary.objects {
-        row(&object.name, object.approaches, object.touching, object.seconds);
+        push(&object.name, touches(object), object.approaches, object.seconds);
     }
-    let touching = summary.objects.iter().map(|object| object.touching).sum();
-    row("all", summary.approaches(), touching, summary.seconds);
-    text + "Every approach was kept, also those that touched nothing: `palpate data check` counts which fingers touched.\n"
-}
-
-fn table(summary: &Summary) -> String {
-    let width = summary.objects.iter().map(|object| object.name.len()).max().unwrap_or(0).max(6);
-    let mut text = format!(
-        "{:width$}  {:>10}  {:>12}  {:>7}  {:>14}\n",
-        "object", "touches", "approaches", "share", "approaches/s"
-    );
-    let mut row = |name: &str, touches: u64, approaches: u64, seconds: f64| {
-        let share = 100.0 * touches as f64 / approaches.max(1) as f64;
-        let rate = decimal(approaches as f64 / seconds, 0);
-        let (touches, approaches) = (count(touches), count(approaches));
-        // Writing to a string cannot fail.
-        _ = writeln!(text, "{name:width$}  {touches:>10}  {approaches:>12}  {share:>6.1}%  {rate:>14}");
-    };
-    for object in &summary.objects {
-        row(&object.name, object.touches, object.approaches, object.seconds);
+    push("all", summary.objects.iter().map(touches).sum(), summary.approaches(), summary.seconds);
+    match keeps_all {
+        true => {
+            rows.text()
+                + "Every approach was kept, also those that touched nothing: `palpate data check` counts which fingers touched.\n"
+        }
+        false => rows.text(),
     }
-    row("all", summary.touches(), summary.approaches(), summary.seconds);
-    text
 }

@@ -1,6 +1,7 @@
 use super::Global;
 use super::chips::{features, instructions};
 use super::expected::PriorArguments;
+use super::keys::one_of;
 use super::numbers::error_rate;
 use super::unstated::UnstatedArguments;
 use palpate::Result;
@@ -13,7 +14,6 @@ use palpate::rows::{Rows, notes, warnings};
 use palpate::with;
 use palpate::wording::count;
 use palpate_shared::format::{Link, MAGIC};
-use std::fmt::Write as _;
 use std::fs::File;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
@@ -215,12 +215,13 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     if global.json {
         return output::print_json_about(&arguments.output, &exported);
     }
-    if !arguments.verbose {
-        return output::print_about(&arguments.output, &summary(&arguments.output, &exported));
-    }
     // Trees that are code are built with the model.
-    let features = if code { String::new() } else { features(&compile::open(&compiled.bytes)?) };
-    output::print_about(&arguments.output, &text(&arguments.output, &exported, &features))
+    let features = match (arguments.verbose, code) {
+        (false, _) => None,
+        (true, true) => Some(String::new()),
+        (true, false) => Some(features(&compile::open(&compiled.bytes)?)),
+    };
+    output::print_about(&arguments.output, &text(&arguments.output, &exported, features.as_deref()))
 }
 
 impl Arguments {
@@ -313,10 +314,7 @@ fn emit_compiled(arguments: &Arguments, global: &Global) -> Result<()> {
         return output::print_json_about(&arguments.output, &written);
     }
     let mut text = format!("{}: {} bytes, as it was\n", arguments.output.display(), written.bytes);
-    for source in &written.sources {
-        // Writing to a string cannot fail.
-        _ = writeln!(text, "Source code: {}", source.display());
-    }
+    text += &sources(&written.sources);
     if arguments.verbose {
         text += &features(&compiled.model());
     }
@@ -463,8 +461,7 @@ fn set_link(ensemble: &mut Ensemble, link: Option<Link>) -> Result<()> {
 }
 
 fn link(name: &str) -> Result<Link, String> {
-    let found = Link::ALL.iter().copied().find(|link| link.name() == name);
-    found.ok_or_else(|| "use one of identity, logistic, exponential, square, softplus".to_owned())
+    one_of(name, Link::ALL.iter().map(|link| (link.name(), *link)))
 }
 
 /// The share that each output has of its object.
@@ -505,17 +502,54 @@ fn scales(arguments: &Arguments, ensemble: &Ensemble) -> Result<(Option<Vec<f32>
     Ok((Some(scales), rows))
 }
 
-/// Three lines on the model, its cost and its call, and notes that may need another option.
-fn summary(path: &Path, exported: &Exported) -> String {
-    let (each, of) = if exported.features.is_some() { ("row", "of the library's") } else { ("touch", "nats") };
+/// The model, its cost and its call, and notes that may need another option; with `features`, the features to build in, all there
+/// is to know.
+fn text(path: &Path, exported: &Exported, features: Option<&str>) -> String {
+    let of = if exported.predicts.is_some() { "of the library's" } else { "nats" };
+    let each = if exported.features.is_some() { "row" } else { "touch" };
+    let shared = exported.shared_leaves.map_or(String::new(), |count| format!(", {count} different"));
+    let parts = match features {
+        None => String::new(),
+        Some(_) => {
+            let Exported { splits, leaves, layout, leaf, .. } = exported;
+            format!(", {splits} splits, {leaves} leaves ({layout}, {leaf}{shared})")
+        }
+    };
     let mut text = format!(
-        "{}: {} bytes, {} trees, margins within {:.1e} {of}\nInstructions per {each}, estimated: {}\n",
+        "{}: {} bytes, {} trees{parts}, margins within {:.1e} {of}\nInstructions per {each}, estimated: {}\n",
         path.display(),
         count(exported.bytes),
         exported.trees,
         exported.margin_error,
         instructions(exported.instructions),
     );
+    let notes = |notes: &[String]| notes.iter().map(|note| format!("Note: {note}\n")).collect::<String>();
+    let Some(features) = features else {
+        return text + &call(path, exported) + &notes(&exported.warnings);
+    };
+    if let (Some(kind), Some(features)) = (&exported.imported, &exported.features) {
+        text = format!("{kind}: {} features, {}\n{text}", features.len(), classes(&exported.classes));
+    }
+    text += &exported.predicts.as_ref().map_or(String::new(), Predicts::text);
+    text += &effects(&exported.scales);
+    text += &sources(&exported.sources);
+    if let Some(path) = &exported.ensemble {
+        text += &format!("The trees, as XGBoost's JSON: {}\n", path.display());
+    }
+    text += &notes(&exported.notes);
+    match exported.layout == Layout::Code.name() {
+        true => text + &format!("The trees are code, which the model has to be built with; see {GUIDE}\n"),
+        false => text + features,
+    }
+}
+
+/// A line for each file of source code.
+fn sources(paths: &[PathBuf]) -> String {
+    paths.iter().map(|path| format!("Source code: {}\n", path.display())).collect()
+}
+
+/// The call of the model from C, as a line.
+fn call(path: &Path, exported: &Exported) -> String {
     let header = exported.sources.iter().find(|source| source.extension().is_some_and(|extension| extension == "h"));
     let name = compile::identifier(&path.file_stem().unwrap_or_default().to_string_lossy());
     let call = match exported.predicts.as_ref().map(|predicts| predicts.what) {
@@ -527,72 +561,28 @@ fn summary(path: &Path, exported: &Exported) -> String {
         Some(_) => format!("{name}_values(row, values)"),
         None => format!("{name}_push(&state, times)"),
     };
-    text += &match (header, exported.sources.first()) {
+    match (header, exported.sources.first()) {
         (Some(header), _) => format!("In C: {call} of {}. More: --verbose\n", header.display()),
         (None, Some(source)) => format!("Source code: {}. More: --verbose\n", source.display()),
         (None, None) => "A header for C: --emit c. More: --verbose\n".into(),
-    };
-    text + &exported.warnings.iter().map(|warning| format!("Note: {warning}\n")).collect::<String>()
-}
-
-fn text(path: &Path, exported: &Exported, features: &str) -> String {
-    let mut text = String::new();
-    // Writing to a string cannot fail.
-    if let (Some(kind), Some(features)) = (&exported.imported, &exported.features) {
-        _ = writeln!(text, "{kind}: {} features, {}", features.len(), classes(&exported.classes));
     }
-    let shared = exported.shared_leaves.map_or(String::new(), |count| format!(", {count} different"));
-    _ = writeln!(
-        text,
-        "{}: {} bytes, {} trees, {} splits, {} leaves ({}, {}{shared}), margins within {:.2e}{}",
-        path.display(),
-        exported.bytes,
-        exported.trees,
-        exported.splits,
-        exported.leaves,
-        exported.layout,
-        exported.leaf,
-        exported.margin_error,
-        if exported.predicts.is_some() { " of the library's" } else { " nats" },
-    );
-    let each = if exported.features.is_some() { "row" } else { "touch" };
-    _ = writeln!(text, "Instructions per {each}, estimated: {}", instructions(exported.instructions));
-    text += &exported.predicts.as_ref().map_or(String::new(), Predicts::text);
-    text += &effects(&exported.scales);
-    for source in &exported.sources {
-        _ = writeln!(text, "Source code: {}", source.display());
-    }
-    if let Some(path) = &exported.ensemble {
-        _ = writeln!(text, "The trees, as XGBoost's JSON: {}", path.display());
-    }
-    for note in &exported.notes {
-        _ = writeln!(text, "Note: {note}");
-    }
-    if exported.layout == Layout::Code.name() {
-        _ = writeln!(text, "The trees are code, which the model has to be built with; see {GUIDE}");
-        return text;
-    }
-    text + features
 }
 
 /// Effects of whole numbers; of features that they hold exactly, only the number.
 fn effects(all: &[Effect]) -> String {
-    let mut text = String::new();
     let is_exact = |effect: &&Effect| effect.values_are_whole == Some(true) && effect.different == effect.thresholds;
     let exact: Vec<String> =
         all.iter().filter(is_exact).map(|effect| format!("{} × {}", effect.feature, effect.scale)).collect();
-    if !exact.is_empty() {
-        _ = writeln!(
-            text,
-            "Whole units hold every value of these rows, and all thresholds stay different: {}",
+    let exact = match exact.is_empty() {
+        true => String::new(),
+        false => format!(
+            "Whole units hold every value of these rows, and all thresholds stay different: {}\n",
             exact.join(", ")
-        );
-    }
+        ),
+    };
     // Those of which thresholds fall together are notes.
-    for effect in all.iter().filter(|effect| !is_exact(effect) && effect.different == effect.thresholds) {
-        _ = writeln!(text, "{effect}");
-    }
-    text
+    let others = all.iter().filter(|effect| !is_exact(effect) && effect.different == effect.thresholds);
+    exact + &others.map(|effect| format!("{effect}\n")).collect::<String>()
 }
 
 fn classes(names: &[String]) -> String {
@@ -603,7 +593,7 @@ fn classes(names: &[String]) -> String {
 }
 
 fn leaf(name: &str) -> Result<Leaf, String> {
-    Leaf::ALL.iter().copied().find(|leaf| leaf.name() == name).ok_or_else(|| "use one of i8, i16, f32".to_owned())
+    one_of(name, Leaf::ALL.iter().map(|leaf| (leaf.name(), *leaf)))
 }
 
 fn scale(text: &str) -> Result<Scale, String> {

@@ -3,7 +3,9 @@
 use palpate::evaluate::{
     ActiveFacts, AlarmCheck, Approaches, Evaluated, Evaluation, Finding, OnStrangers, PromiseCheck, Sequential,
 };
-use palpate::wording::{self, count, counted, rate};
+use palpate::results::{Results, Value};
+use palpate::row;
+use palpate::wording::{count, counted, decimal, percent, percent_within, rate, shares};
 use palpate_shared::DIRECTIONS;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -66,9 +68,7 @@ fn stops(error_rate: f64, promised: Option<f64>) -> String {
 /// Names that are wrong more often than the rate that was asked for or promised of all together.
 fn above_text(evaluation: &Evaluation) -> String {
     let of = evaluation.approaches.as_ref().map_or(&evaluation.sequential, |approaches| &approaches.sequential);
-    let share = |name: &String| {
-        format!("{name} {:.1} %", 100.0 * of.error_of_given_per_object.get(name).copied().unwrap_or(f64::NAN))
-    };
+    let share = |name| (name, of.error_of_given_per_object.get(name).copied().unwrap_or(f64::NAN));
     if of.above.is_empty() {
         return String::new();
     }
@@ -76,7 +76,7 @@ fn above_text(evaluation: &Evaluation) -> String {
     format!(
         "More than {} are wrong of the names given to: {}.{}\n",
         rate(of.error_rate),
-        of.above.iter().map(share).collect::<Vec<_>>().join(", "),
+        shares(of.above.iter().map(share)),
         of.promised.map_or("", |_| promise)
     )
 }
@@ -84,12 +84,12 @@ fn above_text(evaluation: &Evaluation) -> String {
 /// The promise, the measurement, the outcome, and what makes the promise void.
 fn promise_text(check: &PromiseCheck) -> String {
     let of = match (check.per, &check.of) {
-        ("name", Some(name)) => format!(" of {name}, the name that is wrong most often,"),
-        ("object", Some(name)) => format!(" of the names given to {name}, the object that is mistaken most often,"),
+        ("name", Some(name)) => format!(" of {name}, the name that is wrong most often"),
+        ("object", Some(name)) => format!(" of the names given to {name}, the object that is mistaken most often"),
         _ => " of the names given".to_owned(),
     };
     let mut text = format!(
-        "\nPromised: at most {} wrong ({}, {} sure, from {} sequences). Measured: {:.2} %{of} ± {:.2}: {}.\n",
+        "\nPromised: at most {} wrong ({}, {} sure, from {} sequences). Measured: {}{of}: {}.\n",
         rate(check.promised),
         match check.per {
             "name" => "each name, when it is given",
@@ -98,8 +98,7 @@ fn promise_text(check: &PromiseCheck) -> String {
         },
         rate(check.confidence),
         count(check.sequences),
-        100.0 * check.error,
-        100.0 * check.standard_error,
+        percent_within(check.error, check.standard_error, 2),
         found(check.finding, check.exceeded_by, "no name was given")
     );
     if let Some(noise) = &check.recorded {
@@ -119,8 +118,8 @@ fn promise_text(check: &PromiseCheck) -> String {
         if let Some(most) = check.by_theory {
             _ = writeln!(
                 text,
-                "By theory it is at most {:.1} % with any priors, if posteriors can be believed.",
-                100.0 * most
+                "By theory it is at most {} with any priors, if posteriors can be believed.",
+                percent(most, 1)
             );
         }
     }
@@ -129,26 +128,24 @@ fn promise_text(check: &PromiseCheck) -> String {
 
 /// Finding about a promise, in words; `untested` is why there is none.
 fn found(finding: Finding, above: f64, untested: &str) -> String {
-    let points = 100.0 * above;
+    let points = decimal(100.0 * above, 2);
     match finding {
         Finding::Kept => "the promise is kept".to_owned(),
-        Finding::Unclear => format!("{points:.2} points above what is promised, which may be chance"),
-        Finding::Broken => format!("the promise is broken by {points:.2} points"),
+        Finding::Unclear => format!("{points} points above what is promised, which may be chance"),
+        Finding::Broken => format!("the promise is broken by {points} points"),
         Finding::Untested => format!("{untested}, so nothing is known of the promise"),
     }
 }
 
 /// The promised share of false alarms beside the one that was found.
 fn alarms_text(check: &AlarmCheck) -> String {
-    let above = check.above.iter().map(|(name, share)| format!("{name} {:.1} %", 100.0 * share));
-    let above = above.collect::<Vec<_>>().join(", ");
+    let above = shares(check.above.iter().map(|(name, share)| (name, *share)));
     format!(
-        "\nKnown objects taken for unknown. Promised: at most {} ({} sure, from {} sequences). Measured: {:.2} % ± {:.2}: {}.{}\n",
+        "\nKnown objects taken for unknown. Promised: at most {} ({} sure, from {} sequences). Measured: {}: {}.{}\n",
         rate(check.promised),
         rate(check.confidence),
         count(check.sequences),
-        100.0 * check.found,
-        100.0 * check.standard_error,
+        percent_within(check.found, check.standard_error, 2),
         found(check.finding, check.found - check.promised, "there was no sequence"),
         if above.is_empty() { String::new() } else { format!(" More than promised of: {above}.") }
     )
@@ -160,14 +157,12 @@ fn table(evaluation: &Evaluation) -> String {
     let spread = Some(&evaluation.accuracy_standard_error);
     let rows = rows("touches", sequential, (&evaluation.accuracy, &evaluation.per_object), None, spread);
     format!(
-        "{rows}\nStopping {}: {:.1} touches on average, {:.2} % wrong (± {:.2}), {:.2} % undecided after \
-         {}.\nWrong: of all sequences; of names: of those that got a name.\n{} groups per object of {} touches in all; ± is \
-         a standard error.\n",
+        "{rows}\nStopping {}: {} touches on average, {} wrong, {} undecided after {}.\nWrong: of all sequences; of names: of those \
+         that got a name.\n{} groups per object of {} touches in all; ± is a standard error.\n",
         stops(sequential.error_rate, sequential.promised),
-        sequential.mean_touches,
-        100.0 * sequential.error,
-        100.0 * sequential.error_standard_error,
-        100.0 * sequential.undecided,
+        decimal(sequential.mean_touches, 1),
+        percent_within(sequential.error, sequential.error_standard_error, 2),
+        percent(sequential.undecided, 2),
         sequential.max_touches,
         count(evaluation.groups),
         count(evaluation.touches),
@@ -186,44 +181,30 @@ fn rows(
     used: Option<(f64, &BTreeMap<String, f64>)>,
     spread: Option<&ByNumber>,
 ) -> String {
-    let width = per_object.keys().map(|name| name.chars().count()).max().unwrap_or(0).max(head.len());
-    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
-    let row = |name: &str, accuracy: Vec<String>, stops: Vec<String>| {
-        let accuracy = accuracy.iter().map(|cell| format!(" {cell:>7}"));
-        let stops = stops.iter().map(|cell| format!(" {cell:>9}"));
-        format!("{name:width$}{}\n", accuracy.chain(stops).collect::<String>())
-    };
-    let shares = |accuracy: &ByNumber| accuracy.values().copied().map(percent).collect();
-    let stops = |stop: f64, wrong: f64, of_given: f64, undecided: f64, used: Option<f64>| {
-        let own = [format!("{stop:.1}"), percent(wrong), given(of_given), percent(undecided)];
-        own.into_iter().chain(used.map(percent)).collect()
-    };
     let titles = ["to stop", "wrong", "of names", "undecided"].into_iter().chain(used.map(|_| "used"));
-    let numbers = accuracy.keys().map(ToString::to_string).collect();
-    let mut text = row(head, numbers, titles.map(String::from).collect());
+    let numbers = accuracy.keys().map(ToString::to_string);
+    let mut rows = Results::new([head.to_owned()].into_iter().chain(numbers).chain(titles.map(String::from)));
+    let mut push = |name: &str, accuracy: &ByNumber, touches: f64, ends: Vec<f64>| {
+        let share = |share: f64| Value::Percent(share, 1);
+        let accuracy = accuracy.values().copied().map(share);
+        let ends = ends.into_iter().map(share);
+        rows.push(row![name].into_iter().chain(accuracy).chain([Value::Number(touches, 1)]).chain(ends));
+    };
     for (name, accuracy) in per_object {
         let of = |shares: &BTreeMap<String, f64>| shares.get(name).copied().unwrap_or(f64::NAN);
-        let stops = stops(
-            of(&sequential.per_object),
-            of(&sequential.error_per_object),
-            of(&sequential.error_of_given_per_object),
-            of(&sequential.undecided_per_object),
-            used.map(|(_, used)| of(used)),
-        );
-        text += &row(name, shares(accuracy), stops);
+        let Sequential { error_per_object, error_of_given_per_object, undecided_per_object, .. } = sequential;
+        let ends = [error_per_object, error_of_given_per_object, undecided_per_object];
+        let ends = ends.into_iter().chain(used.map(|(_, used)| used)).map(of);
+        push(name, accuracy, of(&sequential.per_object), ends.collect());
     }
     let Sequential { error, error_of_given, undecided, error_standard_error, .. } = *sequential;
-    let (mean, used) = (sequential.mean(), used.map(|(used, _)| used));
-    text += &row("all", shares(accuracy), stops(mean.value, error, error_of_given, undecided, used));
-    let spread = spread.map(|spread| {
-        row("±", shares(spread), vec![format!("{:.1}", mean.standard_error), percent(error_standard_error)])
-    });
-    text + &spread.unwrap_or_default()
-}
-
-/// A share of names given: none where no name was given.
-fn given(share: f64) -> String {
-    if share.is_finite() { format!("{:.1} %", 100.0 * share) } else { "–".into() }
+    let mean = sequential.mean();
+    let ends = [error, error_of_given, undecided].into_iter().chain(used.map(|(used, _)| used));
+    push("all", accuracy, mean.value, ends.collect());
+    if let Some(spread) = spread {
+        push("±", spread, mean.standard_error, vec![error_standard_error]);
+    }
+    rows.text()
 }
 
 /// Figures by approaches: rows, then the sequential figures.
@@ -231,58 +212,49 @@ fn approaches_table(approaches: &Approaches, patterns: &BTreeMap<&str, f64>) -> 
     let sequential = &approaches.sequential;
     let used = Some((approaches.used, &approaches.used_per_object));
     let rows = rows("approaches", sequential, (&approaches.accuracy, &approaches.per_object), used, None);
-    let shares = patterns.iter().map(|(pattern, share)| format!("{pattern} {:.1} %", 100.0 * share));
     format!(
-        "\n{rows}\nStopping {}: {:.1} approaches on average (± {:.1}), {:.1} of them evidence, {:.2} % \
-         wrong (± {:.2}), {:.2} % undecided.\nFingers that touched: {}.\n",
+        "\n{rows}\nStopping {}: {} approaches on average, {} of them evidence, {} wrong, {} undecided.\nFingers that touched: \
+         {}.\n",
         stops(sequential.error_rate, sequential.promised),
-        sequential.mean().value,
-        sequential.mean().standard_error,
-        sequential.mean_touches,
-        100.0 * sequential.error,
-        100.0 * sequential.error_standard_error,
-        100.0 * sequential.undecided,
-        shares.collect::<Vec<_>>().join(", "),
+        Value::Spread(sequential.mean().value, sequential.mean().standard_error, 1).shown(),
+        decimal(sequential.mean_touches, 1),
+        percent_within(sequential.error, sequential.error_standard_error, 2),
+        percent(sequential.undecided, 2),
+        shares(patterns.iter().map(|(pattern, share)| (pattern, *share))),
     )
 }
 
 /// Answers to strangers, in percent: one row per object.
 fn strangers_table(strangers: &OnStrangers) -> String {
-    let percent = |share: f64| wording::percent(share, 1);
+    let OnStrangers { detected, detected_per_object, wrong_name, wrong_name_per_object, .. } = strangers;
+    let undecided = percent(strangers.undecided, 1);
     if !strangers.has_test {
-        let named = strangers.wrong_name_per_object.iter().map(|(name, share)| format!("{name} {}", percent(*share)));
         return format!(
-            "\nObjects that the model does not know: {} got a name, {} no verdict. The model has no test of whether touches \
+            "\nObjects that the model does not know: {} got a name, {undecided} no verdict. The model has no test of whether touches \
              fit an object that it knows, so it never says that one is unknown: palpate calibrate --detect-unknown adds one. \
              Got a name: {}.\n{}",
-            percent(strangers.wrong_name),
-            percent(strangers.undecided),
-            named.collect::<Vec<_>>().join(", "),
+            percent(*wrong_name, 1),
+            shares(wrong_name_per_object.iter().map(|(name, share)| (name, *share))),
             used_up(strangers)
         );
     }
-    let names = strangers.detected_per_object.keys().map(|name| name.chars().count());
-    let width = names.max().unwrap_or(0).max("detected by".len());
-    let mut text = format!("\n{:width$}", "detected by");
-    // Writing to a string cannot fail.
-    strangers.detected.keys().for_each(|at| _ = write!(text, " {at:>8}"));
-    _ = writeln!(text, " {:>9}", "named");
-    let mut line = |name: &str, detected: &BTreeMap<usize, f64>, named: f64| {
-        _ = write!(text, "{name:width$}");
-        detected.values().for_each(|share| _ = write!(text, " {:>8}", percent(*share)));
-        _ = writeln!(text, " {:>9}", percent(named));
+    let numbers = detected.keys().map(ToString::to_string);
+    let mut rows = Results::new(["detected by".into()].into_iter().chain(numbers).chain(["named".into()]));
+    let mut push = |name: &str, detected: &ByNumber, named: f64| {
+        let all = detected.values().copied().chain([named]);
+        rows.push(row![name].into_iter().chain(all.map(|share| Value::Percent(share, 1))));
     };
-    for (name, detected) in &strangers.detected_per_object {
-        line(name, detected, strangers.wrong_name_per_object.get(name).copied().unwrap_or(f64::NAN));
+    for (name, detected) in detected_per_object {
+        push(name, detected, wrong_name_per_object.get(name).copied().unwrap_or(f64::NAN));
     }
-    line("all", &strangers.detected, strangers.wrong_name);
-    let (alarms, undecided) = (percent(strangers.false_alarms), percent(strangers.undecided));
-    _ = writeln!(
-        text,
-        "\nObjects that the model does not know: the share detected after each number of touches, and the share that got a name; \
-         {undecided} got no verdict.\nOf the objects that it knows, {alarms} were taken for unknown."
-    );
-    text + &used_up(strangers)
+    push("all", detected, *wrong_name);
+    format!(
+        "\n{}\nObjects that the model does not know: the share detected after each number of touches, and the share that got a name; \
+         {undecided} got no verdict.\nOf the objects that it knows, {} were taken for unknown.\n{}",
+        rows.text(),
+        percent(strangers.false_alarms, 1),
+        used_up(strangers)
+    )
 }
 
 /// Meaning of a dash in the shares of strangers; nothing where there is none.
@@ -296,26 +268,17 @@ fn used_up(strangers: &OnStrangers) -> String {
         "A dash (–): not known, since touches ran out before a verdict in more than one sequence of a hundred (in {} of all). The \
          model may take {max_touches} touches, and a sequence is drawn from {fewest_touches} at least: capture more approaches to \
          each of these objects, or to each of their instances.\n",
-        wording::percent(*used_up, 1)
+        percent(*used_up, 1)
     )
 }
 
 /// A confusion matrix in shares of its rows, under a title: a row for each of these names, a column for each of those.
 pub(super) fn shares_table(title: &str, rows: &[String], columns: &[String], counts: &[Vec<usize>]) -> String {
-    let names = rows.iter().chain(columns);
-    let width = names.map(|name| name.chars().count()).max().unwrap_or(0).max("7.1 %".len() + 2);
-    let mut text = format!("\n{title}\n{:width$}", "");
-    // Writing to a string cannot fail.
-    columns.iter().for_each(|name| _ = write!(text, " {name:>width$}"));
-    text.push('\n');
+    let mut shares = Results::new([String::new()].iter().chain(columns));
     for (name, counts) in rows.iter().zip(counts) {
-        let groups = counts.iter().sum::<usize>().max(1) as f64;
-        _ = write!(text, "{name:width$}");
-        for &count in counts {
-            let share = if count == 0 { "–".into() } else { format!("{:.1} %", 100.0 * count as f64 / groups) };
-            _ = write!(text, " {share:>width$}");
-        }
-        text.push('\n');
+        let all = counts.iter().sum::<usize>() as f64;
+        let share = |&count: &usize| Value::from((count > 0).then(|| Value::Percent(count as f64 / all, 1)));
+        shares.push(row![name].into_iter().chain(counts.iter().map(share)));
     }
-    text
+    format!("\n{title}\n{}", shares.text())
 }

@@ -6,11 +6,11 @@ use super::probe::{SizeArguments, refuse_unstated};
 use super::progress::Bar;
 use super::scene::SceneArguments;
 use palpate::ensemble::StatedProbe;
-use palpate::fit::{Fit, GrazingEstimate, NOT_TOLD, Settings, between, fit, offset, offset_between};
+use palpate::fit::{Fit, GrazingEstimate, Settings, between, fit, offset, offset_between};
 use palpate::output;
+use palpate::results::{Results, Value};
 use palpate::touches::{Origin, read_touches};
-use palpate::with;
-use palpate::{Error, Result};
+use palpate::{Error, Result, row, with};
 use palpate_shared::format::Length;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -89,60 +89,46 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
 
 /// Estimates, one line for each number.
 fn table(found: &Fit) -> String {
+    let mut rows = Results::new(["", "value", "95 % interval"]);
+    let speed = &found.speed_factor;
+    rows.push(row!["speed over nominal", Value::Number(speed.value, 3), between(speed, 1.0, 3)]);
+    rows.push(row!["first finger", Value::Measure(0.0, 1, "ms"), "the others are compared with it"]);
+    for (name, late) in ["second finger", "third finger"].into_iter().zip(&found.late) {
+        rows.push(row![name, offset(late.value, 1), offset_between(late, 1)]);
+    }
+    rows.push(row!["noise", Value::Measure(found.noise.value, 2, "ms"), between(&found.noise, 1.0, 2) + " ms"]);
+    for (name, missed) in ["first", "second", "third"].into_iter().zip(found.missed.iter().flatten()) {
+        let interval = between(missed, 100.0, 1) + " %";
+        rows.push(row![format!("{name} finger misses"), Value::Percent(missed.value, 1), interval]);
+    }
+    if let Some(stroke) = &found.stroke {
+        let unit = if found.unit == Length::Tenth { "units" } else { "mm" };
+        rows.push(row!["stroke", Value::Measure(stroke.value, 3, unit), between(stroke, 1.0, 3)]);
+    }
+    if let Some(GrazingEstimate { angle, bend }) = &found.grazing {
+        rows.push(row!["fingers bend beyond", Value::Measure(angle.value, 0, "degrees"), between(angle, 1.0, 0)]);
+        rows.push(row!["aside by", Value::Measure(bend.value, 2, "ms"), between(bend, 1.0, 2)]);
+    }
+    rows.push(row!["timer", found.timer.map_or("none found".into(), |timer| format!("{timer} ms"))]);
     let [full, pairs] = found.contacts;
-    let presses = if found.presses > 0 { format!(", {} presses on a plate", found.presses) } else { String::new() };
     let mut text = format!(
-        "{} approaches to {}{}: {full} with three contacts, {pairs} with two{presses}\n\n{:22}{:>14}  95 % interval\n",
+        "{} approaches to {}{}: {full} with three contacts, {pairs} with two{}\n\n{}",
         found.recorded,
         found.objects.join(", "),
         if found.scene.is_floating() { "" } else { " on a table" },
-        "",
-        "value"
+        if found.presses > 0 { format!(", {} presses on a plate", found.presses) } else { String::new() },
+        rows.text()
     );
-    let mut line = |name: &str, value: String, interval: String| {
-        // Writing to a string cannot fail.
-        _ = writeln!(text, "{name:22}{value:>14}  {interval}");
-    };
-    let speed = &found.speed_factor;
-    line("speed over nominal", format!("{:.3}", speed.value), between(speed, 1.0, 3));
-    line("first finger", "0.0 ms".into(), "the others are compared with it".into());
-    for (name, late) in ["second finger", "third finger"].into_iter().zip(&found.late) {
-        line(name, offset(late.value, 1), offset_between(late, 1));
-    }
-    line("noise", format!("{:.2} ms", found.noise.value), between(&found.noise, 1.0, 2) + " ms");
-    for (name, missed) in ["first", "second", "third"].into_iter().zip(found.missed.iter().flatten()) {
-        let interval = between(missed, 100.0, 1) + " %";
-        line(&format!("{name} finger misses"), format!("{:.1} %", 100.0 * missed.value), interval);
-    }
-    if let Some(stroke) = &found.stroke {
-        let unit = if found.unit == Length::Tenth { "" } else { " mm" };
-        line("stroke", format!("{:.3}{unit}", stroke.value), between(stroke, 1.0, 3) + unit);
-    }
-    if let Some(grazing) = &found.grazing {
-        let GrazingEstimate { angle, bend } = grazing;
-        let told = between(angle, 1.0, 0);
-        line("fingers bend beyond", format!("{:.0}°", angle.value), if told == NOT_TOLD { told } else { told + "°" });
-        line("aside by", format!("{:.2} ms", bend.value), between(bend, 1.0, 2) + " ms");
-    }
-    _ = match found.timer {
-        Some(timer) => writeln!(text, "{:22}{:>14}", "timer", format!("{timer} ms")),
-        None => writeln!(text, "{:22}{:>14}", "timer", "none found"),
-    };
     if found.stroke.is_some() {
         text += "\nThe stroke was not stated: no recorded contact is later, where many would be.";
     }
     let coarse = found.readings.or(found.timer.filter(|timer| *timer >= 5.0));
     if let Some(interval) = coarse {
-        // Writing to a string cannot fail.
-        _ = write!(
-            text,
+        text += &format!(
             "\nContact times cluster about multiples of {interval} ms, as if contacts were read only that often. The probe states \
              that as noise, and as its timer; read them more frequently if you can."
         );
     }
     text += "\nOffsets are relative to the first finger's: only differences of times are recorded.\n";
-    for warning in &found.warnings {
-        _ = writeln!(text, "Poorly determined: {warning}");
-    }
-    text
+    text + &found.warnings.iter().map(|warning| format!("Poorly determined: {warning}\n")).collect::<String>()
 }

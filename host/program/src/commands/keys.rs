@@ -27,6 +27,18 @@ pub(super) fn pairs<'t>(
     Ok(pairs)
 }
 
+/// The choice of this name; an error names all.
+pub(super) fn one_of<T>(name: &str, choices: impl IntoIterator<Item = (&'static str, T)>) -> Result<T, String> {
+    let mut names = Vec::new();
+    for (own, choice) in choices {
+        if own == name {
+            return Ok(choice);
+        }
+        names.push(own);
+    }
+    Err(format!("use one of {}", names.join(", ")))
+}
+
 /// The key that may have been meant, as an addition to an error; empty where none is near.
 pub(super) fn nearest(word: &str, keys: &[&str]) -> String {
     let near = |key: &&&str| strsim::jaro(word, key) > 0.7;

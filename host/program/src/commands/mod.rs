@@ -53,7 +53,6 @@ mod link;
 mod maps;
 mod measure;
 mod numbers;
-mod parity;
 mod plan;
 mod play;
 mod probe;
@@ -457,11 +456,6 @@ fn option_of<'s>(setting: &'s str, command: &str) -> &'s str {
         ("scales", _) => "scale",
         (other, _) => other,
     }
-}
-
-/// A share in percent, as it was meant: without the last bits.
-fn percent(share: f64) -> f64 {
-    (share * 1e9).round() / 1e7
 }
 
 /// Reads a data set; its warnings go to stderr.

@@ -1,39 +1,13 @@
-//! `palpate verify` with `--prove`.
+//! The proof of `palpate verify --prove` as text.
 
-use super::Global;
 use super::chips::instructions;
-use palpate::Result;
-use palpate::compile::CompiledModel;
-use palpate::ensemble::import::Options;
-use palpate::ensemble::load_with;
-use palpate::evaluate::verify::Verified;
-use palpate::output;
-use palpate::prove::{Proof, prove};
-use palpate::wording::{decimal, scientific};
-use std::fmt::Write as _;
-use std::path::Path;
+use palpate::prove::Proof;
+use palpate::results::{Results, Value};
+use palpate::row;
+use palpate::wording::scientific;
 
-/// Proves the model; `verified` is what was found before on the rows, and its text.
-pub(super) fn run(
-    model: &Path,
-    ensemble: &Path,
-    verified: Option<(&Verified, String)>,
-    options: &Options<'_>,
-    global: &Global,
-) -> Result<()> {
-    let compiled = CompiledModel::read(model)?;
-    let ensemble = load_with(ensemble, options)?;
-    let proof = prove(compiled.bytes(), &ensemble).map_err(|error| error.in_file(model))?;
-    match verified {
-        None => global.print(&proof, || proof_text(&proof)),
-        Some((verified, _)) if global.json => {
-            output::print_json(&serde_json::json!({ "proof": proof, "verified": verified }))
-        }
-        Some((_, text)) => output::print(&(text + &proof_text(&proof))),
-    }
-}
-
-fn proof_text(proof: &Proof) -> String {
+/// The proof as text.
+pub(super) fn text(proof: &Proof) -> String {
     let Proof { trees, ensemble_trees, boxes, largest_difference, margin_error, stated, ranges, .. } = proof;
     let compared = match trees {
         0 => format!("the model's table equals the sum of the ensemble's {ensemble_trees} trees"),
@@ -55,10 +29,11 @@ fn proof_text(proof: &Proof) -> String {
             "Margins are proved, and not what the model makes of them: its link is {own}, the file's {of_ensemble} (`export --link`).\n"
         );
     }
-    text += "Bounds of each margin:\n";
+    let mut bounds = Results::new(["margin", "at least", "at most"]);
     for (name, least, most) in ranges {
-        _ = writeln!(text, "  {name}: at least {}, at most {}", decimal(*least, 4), decimal(*most, 4));
+        bounds.push(row![name, Value::Number(*least, 4), Value::Number(*most, 4)]);
     }
+    text += &bounds.text();
     if proof.splits > 0 {
         text += &format!("A row passes at most {} splits.\n", proof.splits);
     }

@@ -3,7 +3,7 @@ use super::expected::ExpectedArguments;
 use super::kinds::{self, ModelKind};
 use super::numbers::error_rate;
 use super::recognize_lines::{Event, Line, each_of};
-use super::rows::{reset, verdict_name};
+use super::rows::reset;
 use palpate::Result;
 use palpate::chip::Entry;
 use palpate::compile;
@@ -134,7 +134,7 @@ impl<'m> Stream<'m> {
         let best = self.recognizer.best();
         Line {
             touch: self.recognizer.touches(),
-            verdict: verdict_name(self.recognizer.verdict()),
+            verdict: self.recognizer.verdict().name(),
             // Before the first counted touch no object is more likely than the others.
             object: if self.recognizer.touches() == 0 { "" } else { self.model.object_name(best) },
             posterior: self.recognizer.posterior(best).to_f64(),

@@ -1,9 +1,10 @@
 //! Options for the surroundings of objects: floating, or on a table.
 
+use super::keys::one_of;
 use palpate::mesh::{Object, placements};
 use palpate::touches::Surroundings;
+use palpate::wording::{counted, shares};
 use palpate::{Error, Result};
-use std::fmt::Write as _;
 
 /// The scene, and how objects lie in it.
 #[derive(clap::Args, Clone, Debug, Default)]
@@ -87,30 +88,28 @@ pub(crate) fn described(objects: &[Object]) -> Result<String> {
         let has_several = object.instances().len() > 1;
         for (instance, found) in object.instances().zip(placements::of_object(object)?) {
             let of = if has_several { format!(", {}", instance.name) } else { String::new() };
-            let count = found.placements.len();
-            let plural = if count == 1 { "" } else { "s" };
-            // Writing to a string cannot fail.
-            _ = write!(text, "{}{of}: {count} placement{plural}: {}", object.name, listed(&found.placements));
-            if !found.left_out.is_empty() {
-                _ = write!(text, "; left out: {}", listed(&found.left_out));
-            }
-            _ = writeln!(text, ". The center of mass is {}.", found.center);
+            let count = counted(found.placements.len(), "placement", "placements");
+            let left_out = match listed(&found.left_out) {
+                none if none.is_empty() => none,
+                rare => format!("; left out: {rare}"),
+            };
+            text += &format!(
+                "{}{of}: {count}: {}{left_out}. The center of mass is {}.\n",
+                object.name,
+                listed(&found.placements),
+                found.center
+            );
         }
     }
     Ok(text)
 }
 
 fn listed(placements: &[placements::Placement]) -> String {
-    let one = |placement: &placements::Placement| format!("{} {:.1} %", placement.name, 100.0 * placement.weight);
-    placements.iter().map(one).collect::<Vec<_>>().join(", ")
+    shares(placements.iter().map(|placement| (&placement.name, placement.weight)))
 }
 
 fn scene(name: &str) -> Result<Surroundings, String> {
-    match name {
-        "floating" => Ok(Surroundings::Floating),
-        "table" => Ok(Surroundings::Table { cone: Surroundings::CONE }),
-        _ => Err("use one of floating, table".to_owned()),
-    }
+    one_of(name, [("floating", Surroundings::Floating), ("table", Surroundings::Table { cone: Surroundings::CONE })])
 }
 
 fn weight(text: &str) -> Result<Weight, String> {

@@ -6,6 +6,7 @@ use palpate::calibrate::Found;
 use palpate::mesh::builtin::BACKGROUND_SHAPES;
 use palpate::strangers;
 use palpate::touches::{Dataset, ObjectTouches};
+use palpate::wording::percent;
 use std::path::PathBuf;
 
 /// Test for objects that the model does not know.
@@ -42,13 +43,12 @@ impl StrangersArguments {
 
 /// Findings, as text.
 pub(crate) fn text(found: &Found) -> String {
-    let percent = |share: f64| format!("{:.2} %", 100.0 * share);
     format!(
         "\nStrangers: at most {} of known objects are taken for unknown; {} were, of {} sequences under thresholds at least as \
          strict.\n\
          Names are given after {:.1} touches on average, {:.1} without the test.\n",
-        percent(found.promised),
-        percent(found.false_alarms),
+        percent(found.promised, 2),
+        percent(found.false_alarms, 2),
         found.sequences,
         found.mean_touches,
         found.mean_touches_without,

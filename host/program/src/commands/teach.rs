@@ -1,9 +1,11 @@
 //! Options and output of `palpate train` for recorded touches.
 
 use palpate::error::{Place, Result, problem};
+use palpate::results::{Results, Value};
+use palpate::row;
 use palpate::teach::{Taught, TaughtObject};
 use palpate::touches::{Dataset, ObjectTouches, is_log};
-use std::fmt::Write as _;
+use palpate::wording::percent;
 use std::path::{Path, PathBuf};
 
 /// Recorded touches.
@@ -90,41 +92,27 @@ fn add(all: &mut Dataset, mut read: Dataset, path: &Path) -> Result<()> {
 
 /// Taught objects and their figures.
 pub(crate) fn text(taught: &Taught) -> String {
-    let mut text = String::new();
-    for object in &taught.objects {
-        // Writing to a string cannot fail.
-        _ = writeln!(text, "\n{}", of_object(object, taught));
+    let columns =
+        ["taught", "recorded", "evidence", "jitter ×", "prior", "nats per touch", "recognized", "taken for it"];
+    let mut rows = Results::new(columns);
+    for TaughtObject { name, approaches, touches, smoothing, constant, recognized, taken_for_it } in &taught.objects {
+        rows.push(row![
+            name,
+            *approaches,
+            *touches,
+            smoothing.jitter.to_string(),
+            smoothing.prior.to_string(),
+            Value::Number(*constant, 3),
+            Value::Percent(*recognized, 1),
+            Value::Percent(*taken_for_it, 1),
+        ]);
     }
-    if let Some(others) = taught.others {
-        _ = writeln!(
-            text,
-            "\nOf the other objects {} % are recognized after {} approaches.",
-            percent(others),
-            taught.approaches
-        );
-    }
-    text
-}
-
-fn of_object(object: &TaughtObject, taught: &Taught) -> String {
-    let constant = match object.constant {
-        0.0 => String::new(),
-        constant => format!(", {constant:+.3} nats per touch"),
-    };
+    let others = taught.others.map(|share| format!(" Of the other objects {} are recognized.", percent(share, 1)));
     format!(
-        "{}: {} recorded approaches, {} of them evidence; jitter × {}, a prior of {} touches{constant}. After {} approaches \
-         {} % are recognized, and {} % as many others taken for it (recorded touches that were held out).",
-        object.name,
-        object.approaches,
-        object.touches,
-        object.smoothing.jitter,
-        object.smoothing.prior,
+        "\n{}Evidence is counted in approaches, priors in touches. Recognized and, of as many others, taken for it are shares after {} \
+         approaches, of recorded touches that were held out.{}\n",
+        rows.text(),
         taught.approaches,
-        percent(object.recognized),
-        percent(object.taken_for_it),
+        others.unwrap_or_default()
     )
-}
-
-fn percent(share: f64) -> String {
-    format!("{:.1}", 100.0 * share)
 }

@@ -1,21 +1,23 @@
 //! Thresholds of a calibration, as text.
 
 use palpate::calibrate::{Per, Worse};
+use palpate::results::{Results, Value};
+use palpate::row;
+use palpate::wording::{self, percent};
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 
 /// The promise in words: its rate, its cases, and the meaning of its confidence.
 pub(super) fn promised(rate: f64, per: Per, cases: &str, confidence: f64) -> String {
-    let rate = super::percent(rate);
+    let rate = wording::rate(rate);
     let promised = match per {
-        Per::Average => format!("At most {rate} % of the names are wrong{cases}, on average."),
-        Per::Name => format!("Each name is wrong{cases} at most {rate} % of the times that it is given."),
-        Per::Object => format!("At most {rate} % of the names given to each object are wrong{cases}."),
+        Per::Average => format!("At most {rate} of the names are wrong{cases}, on average."),
+        Per::Name => format!("Each name is wrong{cases} at most {rate} of the times that it is given."),
+        Per::Object => format!("At most {rate} of the names given to each object are wrong{cases}."),
     };
     format!(
-        "{promised} Confidence {} %: of all calibrations at most {} % state a promise that fails.\n",
-        super::percent(confidence),
-        super::percent(1.0 - confidence),
+        "{promised} Confidence {}: of all calibrations at most {} state a promise that fails.\n",
+        wording::rate(confidence),
+        wording::rate(1.0 - confidence),
     )
 }
 
@@ -28,26 +30,23 @@ pub(super) fn text(margins: &BTreeMap<String, f64>, errors: &BTreeMap<String, f6
             "An object is named once it leads by {margin:.2} nats (before calibration: {uncalibrated:.2}).\n"
         );
     }
-    let width = margins.keys().map(|name| name.chars().count()).max().unwrap_or(0);
-    let mut text = format!("\n{:width$} {:>8} {:>8}\n", "", "wrong", "nats");
-    for (name, margin) in margins {
-        let error = errors.get(name).map_or("–".into(), |error| format!("{:.2} %", 100.0 * error));
-        // Writing to a string cannot fail.
-        _ = writeln!(text, "{name:width$} {error:>8} {margin:>8.2}");
+    let mut rows = Results::new(["name", "wrong", "nats"]);
+    for (name, &margin) in margins {
+        let error = errors.get(name).map(|&error| Value::Percent(error, 2));
+        rows.push(row![name, error, Value::Number(margin, 2)]);
     }
-    text + &format!("An object is named once it leads by its nats (before calibration: {uncalibrated:.2}).\n")
+    format!("\n{}An object is named once it leads by its nats (before calibration: {uncalibrated:.2}).\n", rows.text())
 }
 
 /// A warning of objects that a rate of other names hides; `hidden` if one has few names.
 pub(super) fn worse(worse: &[Worse], rate: f64, per: Per, hidden: bool) -> String {
-    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
-    let given = |of: &Worse| of.given.map(|share| format!("{} of those given to {}", percent(share), of.object));
-    let named = |of: &Worse| of.named.map(|share| format!("{} where {} is named", percent(share), of.object));
+    let given = |of: &Worse| of.given.map(|share| format!("{} of those given to {}", percent(share, 1), of.object));
+    let named = |of: &Worse| of.named.map(|share| format!("{} where {} is named", percent(share, 1), of.object));
     let shares: Vec<String> = worse.iter().flat_map(|of| [given(of), named(of)]).flatten().collect();
     if shares.is_empty() {
         return String::new();
     }
-    let rate = super::percent(rate);
+    let rate = wording::rate(rate);
     let what = match per {
         Per::Average => "of all names, and not of each object's",
         Per::Name => "of each name when it is given, and not of those given to each object",
@@ -55,7 +54,7 @@ pub(super) fn worse(worse: &[Worse], rate: f64, per: Per, hidden: bool) -> Strin
     };
     let undecided = if hidden { " An object that mostly stays undecided has few names among all." } else { "" };
     format!(
-        "warning: the {rate} % are {what}: {} are wrong.{undecided} Promise it of each with --per object or --per name.\n",
+        "warning: the {rate} are {what}: {} are wrong.{undecided} Promise it of each with --per object or --per name.\n",
         shares.join(", ")
     )
 }

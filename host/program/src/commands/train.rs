@@ -1,4 +1,5 @@
 use super::Global;
+use super::keys::one_of;
 use super::probe::ProbeArguments;
 use super::progress::Bar;
 use super::real::RealArguments;
@@ -326,29 +327,18 @@ impl Arguments {
 }
 
 fn preset(name: &str) -> Result<Preset, String> {
-    match name {
-        "compact" => Ok(Preset::Compact),
-        "small" => Ok(Preset::Small),
-        "tiny" => Ok(Preset::Tiny),
-        "paper" => Ok(Preset::Paper),
-        _ => Err("use one of compact, small, tiny, paper".into()),
-    }
+    let [compact, small, tiny, paper] = [Preset::Compact, Preset::Small, Preset::Tiny, Preset::Paper];
+    one_of(name, [("compact", compact), ("small", small), ("tiny", tiny), ("paper", paper)])
 }
 
 pub(super) fn evidence(name: &str) -> Result<Counted, String> {
-    let found = Counted::ALL.iter().copied().find(|counted| counted.name() == name);
-    found.ok_or_else(|| "use one of full, contacts, all".to_owned())
+    one_of(name, Counted::ALL.iter().map(|counted| (counted.name(), *counted)))
 }
 
 fn outputs(name: &str) -> Result<Outputs, String> {
-    match name {
-        "placements" => Ok(Outputs::Placements),
-        "objects" => Ok(Outputs::Objects),
-        _ => Err("use one of placements, objects".to_owned()),
-    }
+    one_of(name, [("placements", Outputs::Placements), ("objects", Outputs::Objects)])
 }
 
 pub(super) fn descriptor(name: &str) -> Result<Descriptor, String> {
-    let known = Descriptor::ALL.map(Descriptor::name).join(", ");
-    Descriptor::from_name(name).ok_or_else(|| format!("use one of {known}"))
+    one_of(name, Descriptor::ALL.map(|descriptor| (descriptor.name(), descriptor)))
 }

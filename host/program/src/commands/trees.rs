@@ -1,5 +1,6 @@
 //! The option for how trees are grown: `rounds=100,depth=6,eta=0.3`.
 
+use super::keys::one_of;
 use palpate::ensemble::train::{Engine, Settings};
 use palpate::with;
 use std::str::FromStr;
@@ -57,9 +58,9 @@ impl Trees {
             "eta" => self.eta = Some(value.parse().ok()?),
             "min_child_weight" => self.min_child_weight = Some(value.parse().ok()?),
             "bins" => self.bins = Some(value.parse().ok()?),
-            "leaves" => self.multi_output = Some(choice(value, [("each", true), ("one", false)])?),
+            "leaves" => self.multi_output = Some(one_of(value, [("each", true), ("one", false)]).ok()?),
             "leaf_bits" => self.leaf_bits = Some(value.parse().ok()?),
-            _ => self.trainer = Some(choice(value, [("palpate", Engine::Palpate), ("xgboost", Engine::Xgboost)])?),
+            _ => self.trainer = Some(one_of(value, [("palpate", Engine::Palpate), ("xgboost", Engine::Xgboost)]).ok()?),
         }
         Some(())
     }
@@ -78,11 +79,6 @@ impl Trees {
             trainer = self.trainer.unwrap_or(preset.trainer)
         )
     }
-}
-
-/// Meaning of a word.
-fn choice<T: Copy>(word: &str, choices: [(&str, T); 2]) -> Option<T> {
-    choices.into_iter().find(|(name, _)| *name == word).map(|(_, meaning)| meaning)
 }
 
 #[cfg(test)]

@@ -6,7 +6,11 @@ use palpate::compile::CompiledModel;
 use palpate::ensemble::{self, OverTouches};
 use palpate::error::{Error, Kind, Place};
 use palpate::evaluate::over_touches;
+use palpate::evaluate::parity::{Parity, parity};
 use palpate::evaluate::verify::{Library, Verified, verify};
+use palpate::prove::prove;
+use palpate::results::Results;
+use palpate::row;
 use palpate::rows::{read_margins, read_values};
 use palpate::wording::{count, scientific};
 use std::path::PathBuf;
@@ -53,11 +57,14 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let options = arguments.unstated.options(None);
-    let Some(data) = &arguments.data else {
-        return super::prove::run(&arguments.model, &arguments.ensemble, None, &options, global);
-    };
     let compiled = CompiledModel::read(&arguments.model)?;
     let ensemble = ensemble::load_with(&arguments.ensemble, &options)?;
+    let of_model = |error: Error| error.in_file(&arguments.model);
+    let proved = || prove(compiled.bytes(), &ensemble).map_err(of_model);
+    let Some(data) = &arguments.data else {
+        let proof = proved()?;
+        return global.print(&proof, || super::prove::text(&proof));
+    };
     if ensemble.descriptor().is_some() {
         if arguments.prove {
             return Err(Error::setting("prove", "given", "it without touches: every row is compared"));
@@ -70,8 +77,10 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
         if data.is_file() && !palpate::touches::is_log(data) {
             return Err(over_touches().at(Place::file(&arguments.ensemble)));
         }
-        let data = (data.as_path(), arguments.sequences);
-        return super::parity::run((&arguments.model, &compiled), &ensemble, data, global);
+        let (dataset, sequences) = (super::dataset(data)?.matching(&ensemble.objects), arguments.sequences);
+        let parity =
+            parity(&ensemble, &compiled.model(), &dataset, sequences, global.seed(), &Bar::new()).map_err(of_model)?;
+        return global.print(&parity, || parity_text(&parity));
     }
     let rows = super::rows::read_rows(data, &ensemble, None)?;
     let margins = arguments.library_margins.as_deref().map(read_margins).transpose()?;
@@ -86,53 +95,58 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     };
     let library = Library { margins: margins.as_deref(), values: values.as_deref() };
     let verified = verify(&compiled.model(), &ensemble, &rows, library, &Bar::new()).map_err(place)?;
-    let checked = verified.check().map_err(|error| error.in_file(&arguments.model));
+    let checked = verified.check().map_err(of_model);
     if arguments.prove && checked.is_ok() {
-        let verified = Some((&verified, text(&verified)));
-        return super::prove::run(&arguments.model, &arguments.ensemble, verified, &options, global);
+        let proof = proved()?;
+        let both = serde_json::json!({ "proof": proof, "verified": verified });
+        return global.print(&both, || text(&verified) + &super::prove::text(&proof));
     }
     global.print(&verified, || text(&verified))?;
     checked
 }
 
+/// The model compared with its ensemble, touch by touch and in sequences.
+fn parity_text(parity: &Parity) -> String {
+    let mut rows = Results::list();
+    let stated = format!("nats; the model states {}", scientific(parity.stated_bound));
+    rows.push(row!["touches", parity.touches]);
+    rows.push(row!["largest difference of a margin", scientific(parity.max_margin_error), stated]);
+    rows.push(row!["another best object", parity.best_differs, "touches"]);
+    rows.push(row!["sequences", parity.sequences]);
+    rows.push(row!["another verdict", parity.verdict_differs, "sequences"]);
+    rows.push(row!["the same verdict at another touch", parity.touches_differ, "sequences"]);
+    rows.text()
+}
+
+/// Rows that differ by more than rounding, as a note.
+fn not_explained(rows: usize) -> String {
+    format!("rows, {rows} not explained by the rounding that the model states")
+}
+
 fn text(verified: &Verified) -> String {
-    let Verified { rows, generated_rows, max_margin_error, stated_bound, class_differs, .. } = verified;
-    let mut text = format!(
-        "{} rows and {} made at thresholds: margins differ by at most {} (the model states {}); another class for {}\n",
-        count(*rows),
-        count(*generated_rows),
-        scientific(*max_margin_error),
-        scientific(*stated_bound),
-        count(*class_differs)
-    );
+    let mut rows = Results::list();
+    let stated = format!("the model states {}", scientific(verified.stated_bound));
+    rows.push(row!["rows", verified.rows, format!("and {} made at thresholds", count(verified.generated_rows))]);
+    rows.push(row!["largest difference of a margin", scientific(verified.max_margin_error), stated]);
+    rows.push(row!["another class", verified.class_differs, "rows"]);
     if let (Some(error), Some(classes)) = (verified.library_max_margin_error, verified.library_class_differs) {
         let unexplained = verified.library_class_unexplained.unwrap_or_default();
-        text += &format!(
-            "The library's own margins differ by at most {}; another class for {} rows; the rounding that the model states does \
-             not explain {} of these\n",
-            scientific(error),
-            count(classes),
-            count(unexplained)
-        );
+        rows.push(row!["largest difference to the library's margins", scientific(error)]);
+        rows.push(row!["another class than the library's margins", classes, not_explained(unexplained)]);
     }
-    if let (Some(rows), Some(unexplained)) = (verified.library_values_differ, verified.library_values_unexplained) {
-        text += &match verified.library_max_value_error {
-            Some(error) => format!(
-                "The library predicts values that differ by at most {error:.2e}; for {rows} rows by more than the rounding of \
-                 margins that the model states explains, or by more than a thousandth of what its trees add up to\n"
-            ),
-            None => format!(
-                "The library predicts another class for {rows} rows; the rounding that the model states does not explain \
-                 {unexplained}\n"
-            ),
-        };
+    if let (Some(differ), Some(unexplained)) = (verified.library_values_differ, verified.library_values_unexplained) {
+        match verified.library_max_value_error {
+            Some(error) => {
+                let why = "by more than rounding explains, or a thousandth of what the trees add up to";
+                rows.push(row!["largest difference to the library's values", scientific(error)]);
+                rows.push(row!["another value than the library's", differ, format!("rows, {why}")]);
+            }
+            None => rows.push(row!["another class than the library's", differ, not_explained(unexplained)]),
+        }
     }
     if let Some((change, classes)) = verified.scaling {
-        text += &format!(
-            "Measuring in whole numbers, or in f32, changes the rows' margins by at most {}, and the class of {}\n",
-            scientific(change),
-            count(classes)
-        );
+        rows.push(row!["change by whole numbers, or by f32", scientific(change), "of a margin, at most"]);
+        rows.push(row!["another class by them", classes, "rows"]);
     }
-    text
+    rows.text()
 }

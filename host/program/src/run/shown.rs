@@ -219,7 +219,7 @@ pub fn text(summary: &Summary, out: &Path) -> String {
             None => "undecided".to_owned(),
         };
         let posterior = name.as_ref().map_or_else(String::new, |_| format!(", posterior {posterior:.4}"));
-        recognized.push([format!("  {touched}"), format!("{said} after {approaches} approaches{posterior}")]);
+        recognized.push([format!("  {touched}"), format!("{said} after {approaches:>3} approaches{posterior}")]);
     }
     text += &format!("{}\n{}", recognized.text(), table(summary).text());
     let note = note(summary);

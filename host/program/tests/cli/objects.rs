@@ -10,7 +10,7 @@ fn corners(mesh: &Mesh) -> Vec<[[f32; 3]; 3]> {
 #[test]
 fn an_object_is_written_as_a_closed_mesh_and_the_same_each_time() {
     let at = &Folder::new();
-    says(at, "data objects bowl -o once", &["bowl.obj: ", " triangles"]);
+    says(at, "data objects bowl -o once", &["bowl.obj ", " triangles"]);
     assert_eq!(listing(&at.join("once")), ["bowl.obj"]);
     let mesh = obj::read(&at.join("once/bowl.obj")).unwrap();
     assert!(corners(&mesh) == corners(builtin::one("bowl").unwrap().mesh()), "the file holds another bowl");

@@ -177,15 +177,20 @@ fn what_the_library_predicts_is_compared_too() {
         if is_value {
             let expected = "Predicts the value e^x of the mean x of the trees, the margin / 5";
             assert!(exported.contains(expected), "{exported}");
-            says(at, &with, &["The library predicts values that differ by at most"]);
+            says(at, &with, &["largest difference to the library's values", "another value than the library's"]);
             says(at, "inspect model.palpate", &["the mean x of the trees, the margin / 5"]);
         } else {
-            says(at, &with, &["The library predicts another class for 0 rows"]);
+            says(at, &with, &["another class than the library's", "0  rows, 0 not explained"]);
         }
         // The proof beside it, in one run.
         let prove = format!("{with} --prove");
         let proved = succeeds(at, &prove);
-        assert!(proved.starts_with("60 rows and ") && proved.contains("Proved: on every possible row"), "{proved}");
+        assert!(
+            proved.starts_with("rows ")
+                && proved.contains(" 60  and ")
+                && proved.contains("Proved: on every possible row"),
+            "{proved}"
+        );
         let all = figures(at, &prove);
         assert_eq!((&all["verified"]["rows"], all["proof"]["boxes"].as_u64() > Some(0)), (&60.into(), true), "{all}");
         let text = fs::read_to_string(at.join("prediction.csv")).unwrap();

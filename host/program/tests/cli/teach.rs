@@ -15,12 +15,9 @@ fn touches(path: &Path, most: u64, count: u64, seed: u64) {
 fn a_recorded_object_is_taught_exported_and_recognized() {
     let at = &TAUGHT.folder();
     let text = succeeds(at, "train data --teach pot.txt -o t.json --trees rounds=6,depth=4");
-    let expected = [
-        "pot: 300 recorded approaches, 300 of them evidence",
-        "recorded touches that were held out",
-        "Of the other objects",
-    ];
-    holds(&text, &expected);
+    holds(&text, &["recorded touches that were held out", "Of the other objects"]);
+    let pot = text.lines().find(|line| line.starts_with("pot ")).unwrap();
+    assert!(pot.split_whitespace().take(3).eq(["pot", "300", "300"]), "{text}");
     succeeds(at, "export t.json -o t.palpate");
     let extend = "train data --extend t.json --teach cup.txt -o u.json";
     touches(&at.join("cup.txt"), 20_000, 100, 9);

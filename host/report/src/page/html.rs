@@ -48,6 +48,40 @@ pub(crate) fn data(value: &serde_json::Value) -> Markup {
     html! { script id="data" type="application/json" { (PreEscaped(text)) } }
 }
 
+/// The head of a table: each column's class, if any, and its name.
+pub(crate) fn head(columns: &[(&str, &str)]) -> Markup {
+    html! {
+        thead { tr { @for (class, name) in columns {
+            th class=[Some(class).filter(|class| !class.is_empty())] scope="col" { (name) }
+        } } }
+    }
+}
+
+/// The table of posteriors, which a script fills.
+pub(crate) fn bars(caption: &str) -> Markup {
+    html! {
+        table id="bars" {
+            caption { (caption) }
+            (head(&[("", "object"), ("", "posterior"), ("number", "in %")]))
+            tbody {}
+        }
+    }
+}
+
+/// A heading and a table below it, which a script fills.
+pub(crate) fn filled(id: &str, name: &str, columns: &[(&str, &str)]) -> Markup {
+    html! {
+        h2 { (name) }
+        div.scroll role="region" aria-label=(name) tabindex="0" { table id=(id) { (head(columns)) tbody {} } }
+    }
+}
+
+/// The table of touches: contact times between a first and a last column.
+pub(crate) fn touches(first: &str, last: &str) -> Markup {
+    let [one, two, three] = [("number first", "t1 / ms"), ("number middle", "t2 / ms"), ("number last", "t3 / ms")];
+    filled("touches", "Touches", &[("number", first), one, two, three, ("", last)])
+}
+
 /// Makes tables that are wider than their place say so: for elements of the class `scroll`, and the style of `more`.
 pub(crate) const HINT: &str = include_str!("hint.js");
 

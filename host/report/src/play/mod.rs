@@ -207,28 +207,12 @@ fn body(surfaces: &[Surface], contenders: &[Contender], settings: &Settings) -> 
                     }
                 }
                 p id="verdict" role="status" {}
-                table id="bars" {
-                    caption { "Posterior of each object. The line marks the threshold of a verdict." }
-                    thead { tr { th scope="col" { "object" } th scope="col" { "posterior" } th.number scope="col" { "in %" } } }
-                    tbody {}
-                }
+                (html::bars("Posterior of each object. The line marks the threshold of a verdict."))
                 @if has_plan {
                     label { input type="checkbox" id="where"; " Where next? Show the approach that the plan proposes" }
                     p.note id="proposal" {}
                 }
-                h2 { "Touches" }
-                div.scroll role="region" aria-label="Touches" tabindex="0" {
-                    table id="touches" {
-                        thead { tr {
-                            th.number scope="col" { "approach" }
-                            @for (class, name) in [("first", "t1 / ms"), ("middle", "t2 / ms"), ("last", "t3 / ms")] {
-                                th.number.(class) scope="col" { (name) }
-                            }
-                            th scope="col" { "fingers" }
-                        } }
-                        tbody {}
-                    }
-                }
+                (html::touches("approach", "fingers"))
             }
             (compare(contenders, settings))
             (notes(surfaces, contenders, settings))
@@ -269,14 +253,10 @@ fn compare(contenders: &[Contender], settings: &Settings) -> Markup {
             h2 { "Side by side, on the same touches" }
             div.scroll role="region" aria-label="Models" tabindex="0" {
                 table id="models" {
-                    thead { tr {
-                        th scope="col" { "model" }
-                        th scope="col" { "says" }
-                        th.number scope="col" { "posterior" }
-                        th.number scope="col" { "approaches" }
-                        th.number scope="col" { "of them evidence" }
-                        th.number scope="col" { "bytes" }
-                    } }
+                    (html::head(&[
+                        ("", "model"), ("", "says"), ("number", "posterior"), ("number", "approaches"),
+                        ("number", "of them evidence"), ("number", "bytes"),
+                    ]))
                     tbody {
                         @for contender in contenders {
                             tr {

@@ -13,7 +13,7 @@ use palpate::probe::noise::Noise;
 use palpate::progress::Progress;
 use palpate::touches::Origin;
 use palpate::with;
-use palpate::wording::count;
+use palpate::wording::{count, rate};
 use palpate_shared::format::Length;
 
 /// Most objects on a table: a locator in a page has room for no more.
@@ -94,15 +94,8 @@ fn body(
 ) -> Markup {
     let reach = 2.0 * maps.range;
     let headings = |id: &str, name: &str, columns: &[&str]| {
-        html! {
-            h2 { (name) }
-            div.scroll role="region" aria-label=(name) tabindex="0" {
-                table id=(id) {
-                    thead { tr { @for column in columns { th.number scope="col" { (column) } } } }
-                    tbody {}
-                }
-            }
-        }
+        let columns: Vec<_> = columns.iter().map(|column| ("number", *column)).collect();
+        html::filled(id, name, &columns)
     };
     html! {
         header {
@@ -145,11 +138,7 @@ fn body(
             }
             section.knowledge aria-label="What is believed" {
                 p id="verdict" role="status" {}
-                table id="bars" {
-                    caption { "Posterior of each object. The line marks the threshold of a verdict." }
-                    thead { tr { th scope="col" { "object" } th scope="col" { "posterior" } th.number scope="col" { "in %" } } }
-                    tbody {}
-                }
+                (html::bars("Posterior of each object. The line marks the threshold of a verdict."))
                 (headings("ghosts", "Ghosts: where it may lie", &["object", "rests on", "x / mm", "y / mm", "yaw / °", "in %"]))
                 (headings("touches", "Approaches: place and heights in mm", &["no.", "x", "y", "row / °", "h1", "h2", "h3"]))
             }
@@ -161,8 +150,8 @@ fn body(
                 }
                 p {
                     "The maps are of the meshes: " (cast) " ways to lie, in cells of " (if maps.fine { 1 } else { 2 }) " mm, " (count(bytes)) " bytes. They expect heights to scatter by "
-                    (maps.noise) " mm and " (100.0 * maps.lost) " % of contacts to be lost, and so the page's hand does. An object is named at a \
-                     posterior of " (100.0 * (1.0 - maps.error_rate)) " %, which is a belief and not a calibrated promise."
+                    (maps.noise) " mm and " (rate(maps.lost)) " of contacts to be lost, and so the page's hand does. An object is named at a \
+                     posterior of " (rate(1.0 - maps.error_rate)) ", which is a belief and not a calibrated promise."
                 }
                 p {
                     "x and y are of the middle of the object's bounding box; the yaw is the turn about the vertical. Intervals hold 95 % of the \

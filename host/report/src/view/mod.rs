@@ -279,9 +279,7 @@ fn html(
                 }
                 div.scroll role="region" aria-label="Approaches" tabindex="0" {
                     table {
-                        thead { tr {
-                            @for name in ["approach", "t1 / s", "t2 / s", "t3 / s", "κ / ms"] { th scope="col" { (name) } }
-                        } }
+                        (html::head(&["approach", "t1 / s", "t2 / s", "t3 / s", "κ / ms"].map(|name| ("", name))))
                         tbody {
                             @for (i, approach) in drawn.approaches.iter().enumerate() {
                                 tr data-approach=(i) {

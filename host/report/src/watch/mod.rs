@@ -77,21 +77,15 @@ fn body(has_model: bool, command: &str) -> Markup {
         main {
             section.knowledge aria-label="What the chip knows" {
                 p id="verdict" role="status" {}
-                table id="bars" {
-                    caption {
-                        "Posterior of each object"
-                        @if has_model { ". The line marks the threshold of a verdict." } @else { ", from the chip." }
-                    }
-                    thead { tr { th scope="col" { "object" } th scope="col" { "posterior" } th.number scope="col" { "in %" } } }
-                    tbody {}
-                }
+                (html::bars(match has_model {
+                    true => "Posterior of each object. The line marks the threshold of a verdict.",
+                    false => "Posterior of each object, from the chip.",
+                }))
             }
             section.felt aria-label="What the fingers felt" {
                 figure id="last" {
                     table id="fingers" {
-                        thead { tr {
-                            th scope="col" { "finger" } th scope="col" { "contact" } th.number scope="col" { "ms" }
-                        } }
+                        (html::head(&[("", "finger"), ("", "contact"), ("number", "ms")]))
                         tbody {
                             @for (class, name) in [("first", "first"), ("middle", "middle"), ("last", "last")] {
                                 tr.(class) {
@@ -104,19 +98,7 @@ fn body(has_model: bool, command: &str) -> Markup {
                     }
                     figcaption id="scale" { "The last touch: when each finger made contact." }
                 }
-                h2 { "Touches" }
-                div.scroll role="region" aria-label="Touches" tabindex="0" {
-                    table id="touches" {
-                        thead { tr {
-                            th.number scope="col" { "no." }
-                            @for (class, name) in [("first", "t1 / ms"), ("middle", "t2 / ms"), ("last", "t3 / ms")] {
-                                th.number.(class) scope="col" { (name) }
-                            }
-                            th scope="col" { "the chip says" }
-                        } }
-                        tbody {}
-                    }
-                }
+                (html::touches("no.", "the chip says"))
                 p.note id="line" {}
             }
             section.notes {

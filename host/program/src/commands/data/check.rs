@@ -3,11 +3,12 @@
 use crate::commands::Global;
 use palpate::Result;
 use palpate::error::{Place, problem};
+use palpate::results::{Results, Value};
+use palpate::row;
 use palpate::touches::Origin;
-use palpate::touches::check::{Check, ObjectSummary, Quantiles, Summary};
-use palpate::wording::counted;
+use palpate::touches::check::{Check, ObjectSummary, Summary};
+use palpate::wording::{count, counted};
 use palpate_shared::format::Length;
-use std::fmt::Write as _;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -34,13 +35,13 @@ pub(super) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     }
 }
 
-/// The findings, then the summary. Writing to a string cannot fail.
+/// The findings, then the summary.
 fn text(check: &Check) -> String {
     let mut text = String::new();
     for finding in &check.findings {
         let kind = if finding.is_wrong { "wrong" } else { "note" };
         let fix = if finding.fix.is_empty() { String::new() } else { format!(". {}", finding.fix) };
-        _ = writeln!(text, "{kind}: {finding}{fix}");
+        text += &format!("{kind}: {finding}{fix}\n");
     }
     if !check.findings.is_empty() {
         text.push('\n');
@@ -50,39 +51,27 @@ fn text(check: &Check) -> String {
 
 fn summary(summary: &Summary) -> String {
     let Summary { objects, origin, .. } = summary;
-    let mut text = String::new();
-    let width = objects.iter().map(|object| object.name.chars().count()).max().unwrap_or(0).max(6);
-    let head = ["none", "outer", "middle", "outer+mid", "both outer", "all"];
-    _ = write!(text, "{:width$}  {:>9}  {:>10}", "object", "touches", "approaches");
-    head.iter().for_each(|name| _ = write!(text, "  {name:>10}"));
-    _ = writeln!(text, "  {:>10}  {:>9}  {:>11}", "duplicates", "with pose", "longest / s");
+    let counts = ["none", "outer", "middle", "outer+mid", "both outer", "all", "duplicates", "with pose"];
+    let mut rows = Results::new(["object", "touches", "approaches"].into_iter().chain(counts).chain(["longest / s"]));
+    let mut full = Results::new(["object", "feature", "least", "5 %", "25 %", "50 %", "75 %", "95 %", "largest"]);
     for object in objects {
         let ObjectSummary { name, touches, approaches, patterns, duplicates, posed, longest, .. } = object;
-        let approaches = approaches.map_or("?".into(), |count| count.to_string());
-        _ = write!(text, "{name:width$}  {touches:>9}  {approaches:>10}");
-        patterns.iter().for_each(|count| _ = write!(text, "  {count:>10}"));
-        _ = writeln!(text, "  {duplicates:>10}  {posed:>9}  {longest:>11.6}");
+        let approaches = approaches.map_or("?".into(), Value::from);
+        let counts = patterns.iter().chain([duplicates, posed]).map(|&count| count.into());
+        let longest = Value::Number(*longest, 6);
+        rows.push(row![name, *touches, approaches].into_iter().chain(counts).chain([longest]));
+        for (feature, quantiles) in [("curvature", object.curvature), ("slope", object.slope)] {
+            let values = quantiles.iter().flatten().map(|&value| Value::Number(value, 3));
+            quantiles.is_some().then(|| full.push(row![name, feature].into_iter().chain(values)));
+        }
     }
-    _ = writeln!(text, "\nfull touches, milliseconds: least, quantiles of 5, 25, 50, 75, 95 %, largest");
-    for object in objects {
-        let mut row = |feature: &str, quantiles: Option<Quantiles>| {
-            let Some(quantiles) = quantiles else { return };
-            _ = write!(text, "{:width$}  {feature:9}", object.name);
-            quantiles.iter().for_each(|value| _ = write!(text, "  {value:>9.3}"));
-            text.push('\n');
-        };
-        row("curvature", object.curvature);
-        row("slope", object.slope);
-    }
-    text.push('\n');
-    match origin {
-        None => text += "probe: unknown, since there is no dataset.json\n",
+    let probe = match origin {
+        None => "unknown, since there is no dataset.json".to_owned(),
         Some(origin) => {
             let unit = if origin.unit == Length::Millimeter { "mm" } else { "units" };
             let probe = &origin.probe;
-            _ = writeln!(
-                text,
-                "probe: radius {} {unit}, spacing {} {unit}, speed {} {unit}/s, tilt {}°; seed {}, {}",
+            format!(
+                "radius {} {unit}, spacing {} {unit}, speed {} {unit}/s, tilt {}°; seed {}, {}",
                 probe.radius,
                 probe.spacing,
                 probe.speed,
@@ -93,10 +82,14 @@ fn summary(summary: &Summary) -> String {
                     Origin { approaches: true, .. } => "every approach",
                     _ => "full touches only",
                 }
-            );
+            )
         }
-    }
-    let plural = if objects.len() == 1 { "" } else { "s" };
-    _ = writeln!(text, "{} object{plural}, {} touches", objects.len(), summary.touches());
-    text
+    };
+    format!(
+        "{}\nfull touches, milliseconds: least, quantiles, largest\n{}\nprobe: {probe}\n{}, {} touches\n",
+        rows.text(),
+        full.text(),
+        counted(objects.len(), "object", "objects"),
+        count(summary.touches())
+    )
 }

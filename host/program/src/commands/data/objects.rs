@@ -7,9 +7,8 @@ use palpate::mesh::obj;
 use palpate::mesh::source::{self, Search, Source};
 use palpate::mesh::{Instance, Object};
 use palpate::output;
-use palpate::with;
-use palpate::{Error, Result};
-use std::fmt::Write as _;
+use palpate::results::Results;
+use palpate::{Error, Result, row, with};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -35,15 +34,6 @@ pub(super) struct Arguments {
     probe: ProbeArguments,
 }
 
-/// A file that was written.
-#[derive(serde::Serialize)]
-struct Written {
-    name: String,
-    file: PathBuf,
-    vertices: usize,
-    triangles: usize,
-}
-
 pub(super) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     output::refuse_stdout(&arguments.output)?;
     let (made, files) = made(&arguments)?;
@@ -52,15 +42,13 @@ pub(super) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     for (file, _) in &meshes {
         output::admit(file, &files)?;
     }
-    let written = meshes.into_iter().map(|(file, instance)| write(file, instance)).collect::<Result<Vec<_>>>()?;
-    if global.json {
-        return output::print_json(&written);
+    let mut written = Results::new(["name", "file", "vertices", "triangles"]);
+    for (file, Instance { name, mesh, .. }) in meshes {
+        output::write_whole(&file, |out| obj::write(mesh, out))?;
+        let file = file.display().to_string();
+        written.push(row![name, file, mesh.vertices.len(), mesh.triangles.len()]);
     }
-    let mut text = String::new();
-    for Written { file, vertices, triangles, .. } in &written {
-        let _ = writeln!(text, "{}: {vertices} vertices, {triangles} triangles", file.display());
-    }
-    output::print(&text)
+    global.print(&written, || written.text())
 }
 
 /// The objects, and the files that they come from.
@@ -102,11 +90,6 @@ fn meshes<'a>(object: &'a Object, directory: &Path) -> Vec<(PathBuf, &'a Instanc
         _ => (directory.join(&object.name).join(format!("{}.obj", instance.name)), instance),
     };
     object.instances().map(file).collect()
-}
-
-fn write(file: PathBuf, Instance { name, mesh, .. }: &Instance) -> Result<Written> {
-    output::write_whole(&file, |out| obj::write(mesh, out))?;
-    Ok(Written { name: name.clone(), file, vertices: mesh.vertices.len(), triangles: mesh.triangles.len() })
 }
 
 #[cfg(test)]

@@ -3,7 +3,6 @@
 use crate::commands::expected::ExpectedArguments;
 use crate::commands::numbers::error_rate;
 use crate::commands::recognize_lines::{Event, Line, each_of};
-use crate::commands::rows::verdict_name;
 use crate::commands::{Global, kinds, print_line};
 use palpate::error::Kind;
 use palpate::locate::{self, Approach, Hand, Locating, Maps, POSE, Pose};
@@ -204,7 +203,7 @@ impl Stream<'_> {
         let posterior = self.locating.posteriors().get(best).copied().unwrap_or(0.0);
         let line = Line {
             touch: self.touches,
-            verdict: verdict_name(verdict),
+            verdict: verdict.name(),
             object: if self.touches == 0 { "" } else { self.maps.object_name(best) },
             posterior,
             refused,

@@ -13,7 +13,7 @@ use palpate::evaluate::{self, Classes, Finding, Regression, RowsEvaluation, eval
 use palpate::output;
 use palpate::rows::{Features, SequenceColumns};
 use palpate::stream::{self, Evaluated};
-use palpate::wording;
+use palpate::wording::{self, percent, percent_within, rate};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -108,9 +108,8 @@ fn on_rows(arguments: &Arguments, compiled: &CompiledModel, global: &Global) -> 
         // Writing to a string cannot fail.
         _ = writeln!(
             text,
-            "{rows} rows, each taken alone: {:.1} % right (± {:.1}, a standard error)",
-            100.0 * accuracy,
-            100.0 * accuracy_standard_error
+            "{rows} rows, each taken alone: {} right (± is a standard error)",
+            percent_within(accuracy, accuracy_standard_error, 1)
         );
         text += &shares_table("Taken for", &names, &names, &confusion);
     }
@@ -132,10 +131,6 @@ fn found(finding: Finding, untested: &'static str) -> &'static str {
     }
 }
 
-fn percent(share: f64) -> String {
-    format!("{:.2} %", 100.0 * share)
-}
-
 fn evaluated_text(evaluated: &Evaluated) -> String {
     let Evaluated { sequences, rows, error, wrong, undecided, unknown, mean_rows, median_rows, .. } = evaluated;
     let groups = evaluated.groups.map_or_else(String::new, |groups| format!(" of {groups} groups"));
@@ -144,10 +139,10 @@ fn evaluated_text(evaluated: &Evaluated) -> String {
         "{sequences} sequences{groups}, {rows} rows{refused}\n\
          of the names given {} wrong; of all sequences {} wrong, {} undecided, {} unknown\n\
          {mean_rows:.1} rows to the end on average, half of the sequences within {median_rows}\n",
-        percent(*error),
-        percent(*wrong),
-        percent(*undecided),
-        percent(*unknown),
+        percent(*error, 2),
+        percent(*wrong, 2),
+        percent(*undecided, 2),
+        percent(*unknown, 2),
     );
     if let Some(promise) = &evaluated.promise {
         let of = promise.of.as_ref().map_or_else(String::new, |of| format!(" ({of})"));
@@ -159,9 +154,9 @@ fn evaluated_text(evaluated: &Evaluated) -> String {
         // Writing to a string cannot fail.
         _ = writeln!(
             text,
-            "promised: at most {} % wrong; {} were{of}{groups}: {}",
-            crate::commands::percent(promise.promised),
-            percent(promise.found),
+            "promised: at most {} wrong; {} were{of}{groups}: {}",
+            rate(promise.promised),
+            percent(promise.found, 2),
             found(promise.finding, "no name was given"),
         );
     }

@@ -4,7 +4,7 @@ mod calibrate;
 mod evaluate;
 mod recognize;
 
-pub(super) use recognize::{reset, verdict_name};
+pub(super) use recognize::reset;
 
 use super::remark;
 use palpate::Result;

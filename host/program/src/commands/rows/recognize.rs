@@ -13,6 +13,7 @@ use palpate::evaluate::{self, too_many_objects};
 use palpate::output;
 use palpate::rows::{Encoder, Features, RowOf, SequencesBuilder};
 use palpate::stream::refusal;
+use palpate::wording::rate;
 use palpate_onboard::{Recognizer, RowsSeen, Verdict};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -84,16 +85,6 @@ struct Line<'a> {
     refused: Option<String>,
 }
 
-/// Name of a verdict in results.
-pub(in crate::commands) fn verdict_name(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::Undecided => "undecided",
-        Verdict::Recognized { .. } => "recognized",
-        Verdict::Unknown => "unknown",
-        Verdict::GaveUp => "gave-up",
-    }
-}
-
 /// Starts a recognizer again, with these weights if there are any.
 pub(in crate::commands) fn reset(recognizer: &mut Recognizer<'_, 256>, weights: Option<&[u32]>) {
     match weights {
@@ -129,10 +120,10 @@ fn recognize(
     let starts = starts(&rows.labels).map_err(|error| error.in_file(path))?;
     if let Some(promise) = model.promise().filter(|_| adds_up && sequence.is_none()) {
         crate::commands::remark(&format!(
-            "palpate: note: {}: nothing says where a sequence ends (--sequence-column), so the promise of {} % is for the first \
+            "palpate: note: {}: nothing says where a sequence ends (--sequence-column), so the promise of {} is for the first \
              verdict alone, and none is made for those after it",
             path.display(),
-            crate::commands::percent(promise.rate)
+            rate(promise.rate)
         ));
     }
     let encoder = if adds_up { Encoder::measured(&model) } else { Encoder::of(&model) };
@@ -165,7 +156,7 @@ fn recognize(
         let line = Line {
             row: number,
             sequence: rows.labels.get(number - 1).map(String::as_str),
-            verdict: (has_classes && adds_up).then(|| verdict_name(recognizer.verdict())),
+            verdict: (has_classes && adds_up).then(|| recognizer.verdict().name()),
             class: has_classes.then(|| model.object_name(class)),
             posterior: has_classes.then(|| recognizer.posterior(class).to_f64()),
             rows: (has_classes && adds_up).then(|| recognizer.touches()),
