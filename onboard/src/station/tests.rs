@@ -1,7 +1,7 @@
 //! Models of maps in a station: loaded, touched and asked over the link.
 
-use super::*;
 use super::table::Locates;
+use super::*;
 use crate::locate::tests::{BOTH, Heights, heights, locator, wedge};
 use crate::locate::{Approach, Hand, Maps, POSE, Pose};
 use crate::{Model, Verdict};
