@@ -12,7 +12,6 @@ use palpate::results::{Results, Value};
 use palpate::touches::{Origin, read_touches};
 use palpate::{Error, Result, row, with};
 use palpate_shared::format::Length;
-use std::fmt::Write as _;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]

@@ -112,7 +112,7 @@ impl Aim {
     pub const ALL: [Self; 3] = [Self::Box, Self::Middle, Self::Mass];
 
     /// The name in files and on the command line.
-    pub(crate) const fn name(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             Self::Box => "box",
             Self::Middle => "middle",

@@ -13,7 +13,7 @@
 //!
 //! ```
 //! use palpate_simulator::mesh::Mesh;
-//! use palpate_simulator::probe::{Approach, Probe, Scene, rand};
+//! use palpate_simulator::probe::{Approach, Probe, Scene};
 //! use rand::SeedableRng;
 //!
 //! # fn main() -> palpate_simulator::Result<()> {
