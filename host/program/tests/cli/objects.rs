@@ -52,7 +52,7 @@ fn a_mesh_is_written_but_not_onto_itself() {
     let at = &Folder::new();
     let bowl = globe(at, "bowl", 6);
     let before = std::fs::read(&bowl).unwrap();
-    says(at, "data objects bowl.obj -o again", &["bowl.obj: "]);
+    says(at, "data objects bowl.obj -o again", &["bowl.obj "]);
     assert_eq!(listing(&at.join("again")), ["bowl.obj"]);
     assert!(corners(&obj::read(&at.join("again/bowl.obj")).unwrap()) == corners(&obj::read(&bowl).unwrap()));
     fails(at, "data objects bowl.obj -o .", 2, "another file than what is read");

@@ -20,7 +20,7 @@ pub struct Figure {
     /// Its anchor, and its files' stem.
     id: String,
     title: String,
-    /// How to read it, and how it was made.
+    /// Caption: how to read it, and how it was made.
     caption: String,
     /// The drawings; none of a table.
     panels: Vec<Svg>,
