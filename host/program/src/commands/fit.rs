@@ -7,7 +7,7 @@ use super::progress::Bar;
 use super::recognize_lines::{Event, each_of};
 use super::scene::SceneArguments;
 use palpate::ensemble::StatedProbe;
-use palpate::fit::{Fit, GrazingEstimate, NOT_TOLD, Settings, between, fit, offset, offset_between};
+use palpate::fit::{Fit, FitSettings, GrazingEstimate, NOT_TOLD, between, fit, offset, offset_between};
 use palpate::locate::{BareTable, Measured, REACH, bare_table};
 use palpate::output;
 use palpate::touches::{Origin, read_touches};
@@ -61,7 +61,7 @@ struct FitArguments {
     #[arg(long, value_name = "FILE", requires = "sources")]
     plate: Option<PathBuf>,
     /// Approaches to each object; simulated
-    #[arg(long, value_name = "N", value_parser = count, default_value_t = Settings::default().approaches)]
+    #[arg(long, value_name = "N", value_parser = count, default_value_t = FitSettings::default().approaches)]
     approaches: u64,
     #[command(flatten)]
     size: SizeArguments,
@@ -103,7 +103,7 @@ fn run_fit(arguments: &FitArguments, global: &Global) -> Result<()> {
     let mut objects = arguments.size.objects(&arguments.sources, global.seed())?;
     arguments.scene.weigh(&mut objects)?;
     let plate = arguments.plate.as_deref().map(read_touches).transpose()?;
-    let settings = with!(Settings::default(), origin, approaches = arguments.approaches, seed = global.seed());
+    let settings = with!(FitSettings::default(), origin, approaches = arguments.approaches, seed = global.seed());
     let found = fit(&recorded, &objects, plate.as_deref(), &settings, &Bar::new())?;
     output::write_bytes(&arguments.output, found.toml().as_bytes())?;
     global.print_about(&arguments.output, &found, || table(&found))?;
