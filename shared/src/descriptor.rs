@@ -40,7 +40,7 @@ pub enum Descriptor {
     ContactsOriented,
 }
 
-/// The features of one touch: at most [`MAX_FEATURES`] whole numbers, [`MISSING_FEATURE`] where one is missing.
+/// The features of one touch: at most ten whole numbers, [`MISSING_FEATURE`] where one is missing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Features {
     values: [i32; MAX_FEATURES],

@@ -2,7 +2,7 @@
 
 use crate::random::{self, Shape};
 use crate::replay::groups_and_splits;
-use crate::sections::{trained, with_sections};
+use crate::sections::{Trained, trained, with_sections, write_section};
 use crate::vectors::{Cut, Run};
 use crate::wide::widened;
 use palpate::compile::{Layout, Leaf, Settings, compile};
@@ -10,8 +10,8 @@ use palpate::with;
 use palpate_onboard::{Model, ModelError};
 use palpate_shared::format::{
     Axis, Counted, Group, HEADER_LENGTH, Header, Length, Limits, Link, MUST_UNDERSTAND, MisfitTerms, ObjectMisfit,
-    OutputScale, Outputs, Plan, Position, Prediction, RAW_FEATURES, Sentinel, Strangers, Tag, Trained, TrainedNoise,
-    TrainedProbe, TrainedTouches, checksum, write_section,
+    OutputScale, Outputs, Plan, Position, Prediction, RAW_FEATURES, Sentinel, Strangers, Tag, TrainedNoise,
+    TrainedProbe, TrainedTouches, checksum,
 };
 use palpate_shared::{Descriptor, Patterns, Poses};
 

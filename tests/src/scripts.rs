@@ -3,11 +3,12 @@
 use crate::HOUSEHOLD;
 use crate::replay::Script;
 use crate::sections::with_sections;
+use crate::sections::write_section;
 use crate::vectors;
 use palpate_onboard::Model;
 use palpate_shared::format::{
     Limits, Link, MisfitTerms, ObjectMisfit, OddsByObject, OutputScale, Outputs, Plan, Position, Prediction,
-    RowEvidence, Section, Sentinel, Shifts, Strangers, Tag, Temperature, Weights, f32_key, write_section,
+    RowEvidence, Section, Sentinel, Shifts, Strangers, Tag, Temperature, Weights, f32_key,
 };
 use palpate_shared::{ContactTime, MISSING_FEATURE, Pose, Poses, Touch};
 use rand::RngExt;

@@ -1,6 +1,49 @@
 //! Models with optional sections.
 
-use palpate_shared::format::{HEADER_LENGTH, Header, Tag, Trained, checksum};
+use palpate_shared::format::{
+    HEADER_LENGTH, Header, PatternShares, Section, Tag, TrainedNoise, TrainedProbe, TrainedTouches, checksum,
+};
+
+/// Statements of a model about its training.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Trained {
+    /// The probe.
+    pub probe: Option<TrainedProbe>,
+    /// The touches.
+    pub touches: Option<TrainedTouches>,
+    /// The noise.
+    pub noise: Option<TrainedNoise>,
+    /// The shares of the contact patterns.
+    pub shares: Option<PatternShares>,
+}
+
+impl Trained {
+    /// The bytes of all sections, in order.
+    fn sections(&self) -> Vec<u8> {
+        let mut sections = Vec::new();
+        let mut put = |tag, must_understand, content: &[u8]| {
+            write_section(tag, must_understand, content, &mut |bytes| sections.extend_from_slice(bytes));
+        };
+        if let Some(probe) = self.probe {
+            put(Tag::Probe, false, &probe.to_bytes()[..probe.length()]);
+        }
+        if let Some(touches) = self.touches {
+            put(Tag::Touches, true, &touches.to_bytes());
+        }
+        if let Some(noise) = self.noise {
+            put(Tag::Noise, false, &noise.to_bytes());
+        }
+        if let Some(shares) = self.shares {
+            put(Tag::PatternShares, false, &shares.to_bytes());
+        }
+        sections
+    }
+}
+
+/// Hands the bytes of a section to `put`.
+pub fn write_section(tag: Tag, must_understand: bool, content: &[u8], put: &mut impl FnMut(&[u8])) {
+    Section { tag: tag.code(), must_understand, content }.write(put);
+}
 
 /// The model with these optional sections instead of those that it has.
 ///
@@ -23,8 +66,7 @@ pub fn with_sections(model: &[u8], sections: &[u8]) -> Vec<u8> {
 /// # Panics
 /// Like [`with_sections`].
 pub fn trained(model: &[u8], trained: &Trained) -> Vec<u8> {
-    let mut sections = Vec::new();
-    trained.write(|bytes| sections.extend_from_slice(bytes));
+    let mut sections = trained.sections();
     // What the leaves' meaning depends on stays.
     let opened = palpate_onboard::Model::new(model).expect("a model");
     let own = opened.optional_sections().filter(|section| section.tag == Tag::SharedLeaves.code());

@@ -11,7 +11,7 @@ use crate::work::{Callback, long};
 use palpate::calibrate::{self, Per};
 use palpate::compile;
 use palpate::error::Error;
-use palpate::locate::{self, Aimed, Approach, Hand, Heights, MapsFile, Promised, Seen, Settings, Terms, Until};
+use palpate::locate::{self, Aimed, Approach, CastSettings, Hand, Heights, MapsFile, Promised, Seen, Terms, Until};
 use palpate::mesh::Object;
 use palpate::mesh::facts::sides;
 use palpate::output;
@@ -53,12 +53,18 @@ impl Maps {
 }
 
 /// Settings as Python states them.
-fn settings(Real(real): &Real, cell: f64, range: f64, error_rate: f64, max_touches: u32) -> palpate::Result<Settings> {
+fn settings(
+    Real(real): &Real,
+    cell: f64,
+    range: f64,
+    error_rate: f64,
+    max_touches: u32,
+) -> palpate::Result<CastSettings> {
     if cell != 1.0 && cell != 2.0 {
         return Err(Error::setting("cell", cell, "1 or 2, in millimeters"));
     }
     real.check()?;
-    let settings = with!(Settings::default(), fine = cell < 2.0, range, error_rate, max_touches).expecting(real);
+    let settings = with!(CastSettings::default(), fine = cell < 2.0, range, error_rate, max_touches).expecting(real);
     settings.check()?;
     Ok(settings)
 }

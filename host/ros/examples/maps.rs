@@ -7,7 +7,7 @@
 //!
 //! The bar is 40 mm long and 16 mm wide, the puck 32 mm wide, and both are 25 mm high and lie on their origin.
 
-use palpate::locate::{Settings, Surface, write};
+use palpate::locate::{CastSettings, Surface, write};
 use palpate::probe::Probe;
 use palpate::with;
 use std::error::Error;
@@ -34,7 +34,7 @@ pub(crate) fn maps() -> palpate::Result<Vec<u8>> {
     });
     let surfaces: Vec<Surface> = surfaces.collect();
     let probe = with!(Probe::default(), radius = 1.5, spacing = 15.0, speed = 100.0, tilt = 0.0, stroke = Some(20.0));
-    write(&surfaces, &objects.map(String::from), &probe, &with!(Settings::default(), fine = false))
+    write(&surfaces, &objects.map(String::from), &probe, &with!(CastSettings::default(), fine = false))
 }
 
 /// Height of an object over a place, in millimeters.

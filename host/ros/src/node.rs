@@ -16,7 +16,7 @@ use crate::wire::{
 use async_channel::{Receiver, Sender};
 use async_signal::{Signal, Signals};
 use futures::stream::{self, LocalBoxStream, SelectAll, StreamExt};
-use palpate::onboard::effector::{Scale, Settings};
+use palpate::onboard::effector::{EffectorSettings, Scale};
 use palpate::onboard::shared::Touch as Felt;
 use ros2_client::action::{CancelHandle, ExecutingGoalHandle, GoalEndStatus, NewGoalHandle};
 use ros2_client::builtin_interfaces::Time;
@@ -132,11 +132,11 @@ pub(crate) fn run(options: Options, signals: Signals) -> Result<(), String> {
 }
 
 /// Times of the effector for a model.
-fn settings(model: Option<&Served>) -> Settings {
+fn settings(model: Option<&Served>) -> EffectorSettings {
     match model {
-        Some(Served::Trees(model)) => Settings::default().for_model(&model.model(), &Scale::IDENTITY),
+        Some(Served::Trees(model)) => EffectorSettings::default().for_model(&model.model(), &Scale::IDENTITY),
         // Switches do not know where the hand is.
-        Some(Served::Maps(_)) | None => Settings::default(),
+        Some(Served::Maps(_)) | None => EffectorSettings::default(),
     }
 }
 

@@ -3,7 +3,7 @@
 //! `std_msgs/Bool` has no stamp: an edge happened when it was published, which the middleware says. Edges of three topics
 //! arrive in any order; they wait until those that are older have had time to come.
 
-use palpate::onboard::effector::{Edge, Effector, Fault, Finger, Settings};
+use palpate::onboard::effector::{Edge, Effector, EffectorSettings, Fault, Finger};
 use palpate::onboard::shared::Touch;
 use std::collections::BTreeMap;
 
@@ -26,7 +26,7 @@ pub(crate) struct Switches {
 
 impl Switches {
     /// Switches that wait as `settings` say.
-    pub(crate) fn new(settings: Settings) -> Self {
+    pub(crate) fn new(settings: EffectorSettings) -> Self {
         Self { effector: Effector::new(settings), waiting: BTreeMap::new(), arrived: 0, ahead: None }
     }
 
@@ -83,7 +83,7 @@ mod tests {
 
     /// Messages at times in milliseconds, each with its delay in milliseconds, in the order of arrival.
     fn touches(messages: &[(u64, u64, Finger, bool)]) -> Vec<Result<Touch, Fault>> {
-        let mut switches = Switches::new(Settings::default());
+        let mut switches = Switches::new(EffectorSettings::default());
         let mut sorted = messages.to_vec();
         sorted.sort_by_key(|(at, late, ..)| at + late);
         let mut found = Vec::new();

@@ -120,7 +120,7 @@ impl Summary {
 
 /// Streams `steps` to the chip until they end or `each` breaks, and passes every update to `each`, in order. With a
 /// `mirror`, the host recognizes the same touches with this model's bytes and compares every verdict, posterior and evidence; with
-/// maps it has room for [`CELLS`] cells. Answers to `asks` are compared too.
+/// maps it has room for as many cells as a chip. Answers to `asks` are compared too.
 ///
 /// # Errors
 /// When a step cannot be read, the chip refuses a touch, the line breaks, the mirror's model is not the chip's, or it is

@@ -1,6 +1,6 @@
 //! Advice on what recordings cannot determine, and what to record next.
 
-use super::layer::MOST_ANGLE;
+use super::layer::MAX_ANGLE;
 use super::outcome::{Fit, Warning};
 use super::timer::Timer;
 use super::words::{Estimate, NOT_TOLD, between, offset_between};
@@ -89,7 +89,7 @@ pub(super) fn warnings(fit: &Fit, timer: Timer) -> Vec<Warning> {
     if let Some(grazing) = fit.grazing.filter(|grazing| grazing.angle.low.is_none() && grazing.angle.high.is_none()) {
         let record = format!(
             "Record {}. If the fingers are rigid, take the line grazing out of the probe file.",
-            more(grazing.angle.width(), MOST_ANGLE)
+            more(grazing.angle.width(), MAX_ANGLE)
         );
         warn("the angle beyond which fingers bend", NOT_TOLD.into(), record);
     }

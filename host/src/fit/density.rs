@@ -11,7 +11,7 @@
 
 use super::candidate::NOISE;
 use super::late::Late;
-use super::line::{Axis, Kernel, LEVELS, Line, RATIO, deviation_of, mix};
+use super::line::{Axis, Kernel, LEVELS, Line, RATIO, deviation_of, interpolate};
 use super::observed::{FULL, OUTER, Observed, mirrored};
 use palpate_shared::Touch;
 use rayon::prelude::*;
@@ -31,7 +31,7 @@ impl Plane {
     fn new(samples: &[[f32; 2]], deviation: f64) -> (Self, Line) {
         let deviations = [6.0_f64.sqrt() * deviation, 2.0_f64.sqrt() * deviation];
         let axes = [0, 1].map(|axis| {
-            let farthest = samples.iter().fold(1.0_f64, |most, sample| most.max(f64::from(sample[axis].abs())));
+            let farthest = samples.iter().fold(1.0_f64, |farthest, sample| farthest.max(f64::from(sample[axis].abs())));
             Axis::new(deviations[axis], 1.2 * farthest + 4.0 * deviations[axis])
         });
         let values = axes.each_ref().map(Axis::values);
@@ -42,30 +42,31 @@ impl Plane {
         for &[x, y] in samples {
             axes[0].kernel(x.into(), deviations[0], &values[0], &mut down);
             axes[1].kernel(y.into(), deviations[1], &values[1], &mut across);
-            let (row, down) = down.own();
-            for (column, across) in [across.own(), across.mirrored()] {
+            let (row, down) = down.plain();
+            for (column, across) in [across.plain(), across.mirrored()] {
                 second.add((column, across));
                 for (row, height) in (row..).zip(down) {
                     let cells = density[row * columns + column..].iter_mut();
-                    cells.zip(across).for_each(|(cell, own)| *cell += height * own);
+                    cells.zip(across).for_each(|(cell, value)| *cell += height * value);
                 }
             }
         }
-        let share = 0.5 / samples.len().max(1) as f32;
-        density.iter_mut().for_each(|cell| *cell *= share);
+        let per_sample = 0.5 / samples.len().max(1) as f32;
+        density.iter_mut().for_each(|cell| *cell *= per_sample);
         (Self { axes, density }, second.scaled(2 * samples.len()))
     }
 
-    fn at(&self, x: f64, y: f64) -> f64 {
+    /// The density at a point, interpolated between cells; 0 outside of the table.
+    fn density(&self, x: f64, y: f64) -> f64 {
         let (Some((row, down)), Some((column, across))) = (self.axes[0].between(x), self.axes[1].between(y)) else {
             return 0.0;
         };
         let columns = self.axes[1].cells();
-        let at = |row: usize| {
+        let in_row = |row: usize| {
             let first = row * columns + column;
-            mix(self.density[first].into(), self.density[first + 1].into(), across)
+            interpolate(self.density[first].into(), self.density[first + 1].into(), across)
         };
-        mix(at(row), at(row + 1), down)
+        interpolate(in_row(row), in_row(row + 1), down)
     }
 }
 
@@ -73,9 +74,9 @@ impl Plane {
 #[derive(Debug)]
 struct Level {
     full: Plane,
-    /// Two neighboring fingers: alone, and of full touches.
+    /// Differences of two neighboring fingers, in touches of these two only and in full touches.
     neighbors: [Line; 2],
-    /// The outer fingers: alone, and of full touches.
+    /// Differences of the outer fingers, in touches of these two only and in full touches.
     outer: [Line; 2],
 }
 
@@ -86,9 +87,9 @@ pub(super) struct Densities {
     pub(super) name: String,
     /// κ and slope.
     full: Vec<[f32; 2]>,
-    /// The middle finger's time less the outer one's.
+    /// The middle finger's time minus the outer one's, like [`Level::neighbors`].
     neighbors: [Vec<f32>; 2],
-    /// The third finger's time less the first one's, where only these two touch.
+    /// The third finger's time minus the first one's, where only these two touch.
     outer: Vec<f32>,
     /// The share of each set of fingers among all approaches, a set and its mirror image alike.
     pub(super) shares: [f64; 8],
@@ -152,17 +153,18 @@ impl Densities {
         let position = ((noise / NOISE[0]).ln() / RATIO.ln()).clamp(0.0, (LEVELS - 1) as f64);
         let level = (position.floor() as usize).min(LEVELS - 2);
         let levels = [self.level(level), self.level(level + 1)];
-        Smoothed { level, levels, share: position - level as f64, late: self.late.as_ref() }
+        Smoothed { level, levels, fraction: position - level as f64, late: self.late.as_ref() }
     }
 }
 
-/// Densities under a noise between two tables'.
+/// Densities under a noise between those of two tables.
 #[derive(Clone, Copy)]
 pub(super) struct Smoothed<'a> {
     /// The lower level.
     level: usize,
     levels: [&'a Level; 2],
-    share: f64,
+    /// Position of the noise between the two levels, from 0 to 1.
+    fraction: f64,
     late: Option<&'a Late>,
 }
 
@@ -172,18 +174,18 @@ pub(super) struct Apart([f64; 2]);
 impl Smoothed<'_> {
     /// Density of κ and slope of a full touch, per square millisecond.
     pub(super) fn full(&self, curvature: f64, slope: f64) -> f64 {
-        let [one, other] = self.levels;
-        mix(one.full.at(curvature, slope), other.full.at(curvature, slope), self.share)
+        let [lower, upper] = self.levels;
+        interpolate(lower.full.density(curvature, slope), upper.full.density(curvature, slope), self.fraction)
     }
 
     /// Position of a difference of two fingers' times in the tables of both levels.
     pub(super) fn apart(&self, late: f64) -> Apart {
-        let [one, other] = self.levels;
-        Apart([one.neighbors[0].away(late), other.neighbors[0].away(late)])
+        Apart(self.levels.map(|level| level.neighbors[0].away(late)))
     }
 
-    fn pair(&self, Apart([one, other]): &Apart, lines: impl Fn(&Level) -> &Line) -> f64 {
-        mix(lines(self.levels[0]).at(*one), lines(self.levels[1]).at(*other), self.share)
+    fn pair(&self, Apart([lower, upper]): &Apart, line: impl Fn(&Level) -> &Line) -> f64 {
+        let [lower, upper] = [line(self.levels[0]).density(*lower), line(self.levels[1]).density(*upper)];
+        interpolate(lower, upper, self.fraction)
     }
 
     /// Density of how much later the middle finger is than an outer one, per millisecond, if only these two touch and if all do.
@@ -197,9 +199,10 @@ impl Smoothed<'_> {
     }
 
     /// [`Late::density`], 0 without a stroke.
-    pub(super) fn late(&self, window: f64, which: usize, Apart([one, other]): &Apart) -> f64 {
+    pub(super) fn late(&self, window: f64, which: usize, Apart([lower, upper]): &Apart) -> f64 {
         let Some(late) = self.late else { return 0.0 };
-        let at = |level: usize, away| late.density(window, level, 2.0_f64.sqrt() * deviation_of(level), which, away);
-        mix(at(self.level, *one), at(self.level + 1, *other), self.share)
+        let density =
+            |level: usize, away| late.density(window, level, 2.0_f64.sqrt() * deviation_of(level), which, away);
+        interpolate(density(self.level, *lower), density(self.level + 1, *upper), self.fraction)
     }
 }

@@ -6,12 +6,12 @@
 //! one and read with interpolation. What is recorded lies within the stroke, where nothing changes. Noise, a hundredth of
 //! a stroke, is left out at its end, and offsets where only one contact was recorded.
 
-use super::line::{LEVELS, Line, mix};
+use super::line::{LEVELS, Line, interpolate};
 use super::observed::{FULL, OUTER, Observed, mirrored};
 use palpate_shared::Touch;
 use std::sync::OnceLock;
 
-/// The strokes that tables are made for, in recorded ones: as far as a probe's speed may be off.
+/// Strokes that tables are made for, relative to the recorded one: the range in which a probe's speed may lie.
 const STEPS: [f64; 5] = [0.75, 0.87, 1.0, 1.15, 1.33];
 
 /// Simulated touches of one object, as hands with about this stroke make them.
@@ -28,8 +28,8 @@ struct Step {
     shares: [f64; 8],
     /// Differences between the other two fingers, in touches of three fingers with one late: of neighbors, and of the outer fingers.
     samples: [Vec<f32>; 2],
-    /// Share of each of these among all approaches; of neighbors, of either two.
-    of_full: [f64; 2],
+    /// Share of each of these samples among all approaches, for neighbors that of either two.
+    late_shares: [f64; 2],
     levels: [OnceLock<[Line; 2]>; LEVELS],
 }
 
@@ -39,16 +39,18 @@ impl Late {
         Self { window, steps: STEPS.map(|step| Step::new(touches, window * step)) }
     }
 
-    /// Position of a stroke of this many simulated milliseconds among the tables: the lower one, and the share of the next.
+    /// Position of a stroke of this many simulated milliseconds among the tables: the lower table, and the weight of the next
+    /// one.
     fn place(&self, window: f64) -> (usize, f64) {
         let step = (window / self.window).clamp(STEPS[0], STEPS[STEPS.len() - 1]);
-        let lower = (STEPS.partition_point(|own| *own <= step).max(1) - 1).min(STEPS.len() - 2);
+        let lower = (STEPS.partition_point(|table| *table <= step).max(1) - 1).min(STEPS.len() - 2);
         (lower, (step - STEPS[lower]) / (STEPS[lower + 1] - STEPS[lower]))
     }
 
-    fn between(&self, window: f64, of: impl Fn(&Step) -> f64) -> f64 {
-        let (lower, share) = self.place(window);
-        mix(of(&self.steps[lower]), of(&self.steps[lower + 1]), share)
+    /// Interpolates what two neighboring tables hold.
+    fn between(&self, window: f64, value: impl Fn(&Step) -> f64) -> f64 {
+        let (lower, fraction) = self.place(window);
+        interpolate(value(&self.steps[lower]), value(&self.steps[lower + 1]), fraction)
     }
 
     /// The share of each set of fingers among all approaches where the stroke takes this long.
@@ -60,7 +62,7 @@ impl Late {
     /// neighbors or, with `which` 1, of the outer fingers. `deviation` is the noise of level `level`, and `away` the
     /// difference in cells of its tables.
     pub(super) fn density(&self, window: f64, level: usize, deviation: f64, which: usize, away: f64) -> f64 {
-        self.between(window, |step| step.of_full[which] * step.level(level, deviation)[which].at(away))
+        self.between(window, |step| step.late_shares[which] * step.level(level, deviation)[which].density(away))
     }
 }
 
@@ -81,12 +83,12 @@ impl Step {
                 _ => debug_assert!(kept.contacts() == 1 || kept.fingers == FULL),
             }
         }
-        let all = touches.len().max(1) as f64;
-        let of_full = [samples[0].len(), samples[1].len()].map(|count| count as f64 / (2.0 * all));
+        let approaches = touches.len().max(1) as f64;
+        let late_shares = [samples[0].len(), samples[1].len()].map(|count| count as f64 / (2.0 * approaches));
         Self {
             shares: mirrored(&counts, touches.len()),
             samples,
-            of_full,
+            late_shares,
             levels: std::array::from_fn(|_| OnceLock::new()),
         }
     }

@@ -2,11 +2,11 @@
 
 use super::candidate::NOISE;
 
-/// Standard deviations of the tables begin at the least of [`NOISE`]: how much larger each is than the one before, and how
-/// many there are.
+/// Ratio of the standard deviations of neighboring tables, which begin at the smallest of [`NOISE`].
 pub(super) const RATIO: f64 = 1.3;
+/// Number of tables.
 pub(super) const LEVELS: usize = 22;
-/// By how much of its distance from 0 a simulated touch is smoothed.
+/// Standard deviation that a simulated touch is smoothed by, as a share of its distance from 0.
 const SMOOTHING: f64 = 0.03;
 /// Growth of cells with the distance from 0, as a share of it.
 const GROWTH: f64 = 0.02;
@@ -69,17 +69,17 @@ impl Axis {
             let (from, to) = (cell(low).ceil() as usize, cell(high).floor() as usize);
             from..=to.max(from)
         };
-        let (own, mirrored) = (range(low, high), range(-high, -low));
+        let (plain, mirrored) = (range(low, high), range(-high, -low));
         // Rounding may make one of them longer.
-        let [from, to] = [*own.start().min(&(last - mirrored.end())), *own.end().max(&(last - mirrored.start()))];
+        let [from, to] = [*plain.start().min(&(last - mirrored.end())), *plain.end().max(&(last - mirrored.start()))];
         let height = 1.0 / (width * std::f64::consts::TAU.sqrt());
-        kernel.first = [*own.start(), *mirrored.start()];
+        kernel.first = [*plain.start(), *mirrored.start()];
         let density = |value: &f64| (height * (-0.5 * ((value - x) / width).powi(2)).exp()) as f32;
         kernel.both.clear();
         kernel.both.extend(values[from..=to].iter().map(density));
         kernel.mirrored.clear();
         kernel.mirrored.extend(kernel.both[last - mirrored.end() - from..=last - mirrored.start() - from].iter().rev());
-        kernel.own = own.start() - from..own.end() + 1 - from;
+        kernel.plain = plain.start() - from..plain.end() + 1 - from;
     }
 
     /// The value of each cell.
@@ -93,17 +93,17 @@ impl Axis {
 pub(super) struct Kernel {
     first: [usize; 2],
     both: Vec<f32>,
-    own: std::ops::Range<usize>,
+    plain: std::ops::Range<usize>,
     mirrored: Vec<f32>,
 }
 
 impl Kernel {
     /// The first cell, and the density at this and the following cells.
-    pub(super) fn own(&self) -> (usize, &[f32]) {
-        (self.first[0], &self.both[self.own.clone()])
+    pub(super) fn plain(&self) -> (usize, &[f32]) {
+        (self.first[0], &self.both[self.plain.clone()])
     }
 
-    /// [`Kernel::own`] of the mirror image.
+    /// Like [`Kernel::plain`], for the mirror image.
     pub(super) fn mirrored(&self) -> (usize, &[f32]) {
         (self.first[1], &self.mirrored)
     }
@@ -118,13 +118,13 @@ pub(super) struct Line {
 
 impl Line {
     pub(super) fn new(samples: &[f32], deviation: f64) -> Self {
-        let farthest = samples.iter().fold(1.0_f64, |most, x| most.max(f64::from(x.abs())));
+        let farthest = samples.iter().fold(1.0_f64, |farthest, x| farthest.max(f64::from(x.abs())));
         let axis = Axis::new(deviation, 1.2 * farthest + 4.0 * deviation);
         let values = axis.values();
         let (mut line, mut kernel) = (Self::empty(axis), Kernel::default());
         for &x in samples {
             line.axis.kernel(x.into(), deviation, &values, &mut kernel);
-            line.add(kernel.own());
+            line.add(kernel.plain());
         }
         line.scaled(samples.len())
     }
@@ -141,8 +141,8 @@ impl Line {
 
     /// The density where this many samples were added.
     pub(super) fn scaled(mut self, samples: usize) -> Self {
-        let share = 1.0 / samples.max(1) as f32;
-        self.density.iter_mut().for_each(|cell| *cell *= share);
+        let per_sample = 1.0 / samples.max(1) as f32;
+        self.density.iter_mut().for_each(|cell| *cell *= per_sample);
         self
     }
 
@@ -152,15 +152,15 @@ impl Line {
     }
 
     /// The density at a position in cells from 0.
-    pub(super) fn at(&self, away: f64) -> f64 {
-        let Some((cell, share)) = self.axis.between_cells(away) else { return 0.0 };
-        mix(self.density[cell].into(), self.density[cell + 1].into(), share)
+    pub(super) fn density(&self, away: f64) -> f64 {
+        let Some((cell, fraction)) = self.axis.between_cells(away) else { return 0.0 };
+        interpolate(self.density[cell].into(), self.density[cell + 1].into(), fraction)
     }
 }
 
-/// The value this share of the way from one to the other.
-pub(super) fn mix(one: f64, other: f64, share: f64) -> f64 {
-    one + share * (other - one)
+/// Interpolates linearly: `first` at the fraction 0, `second` at 1.
+pub(super) fn interpolate(first: f64, second: f64, fraction: f64) -> f64 {
+    first + fraction * (second - first)
 }
 
 /// The standard deviation of a level, in milliseconds.

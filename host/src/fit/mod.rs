@@ -27,7 +27,7 @@
 //! # fn main() -> palpate::Result<()> {
 //! let objects = source::objects(&["meshes".into()])?;
 //! let recorded = Dataset::read_any("recorded".as_ref())?;
-//! let fit = fit(&recorded, &objects, None, &fit::Settings::default(), &())?;
+//! let fit = fit(&recorded, &objects, None, &fit::FitSettings::default(), &())?;
 //! println!("{}", fit.toml());
 //! # Ok(())
 //! # }
@@ -81,7 +81,7 @@ use touched::Touched;
 /// Settings of a fit.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
-pub struct Settings {
+pub struct FitSettings {
     /// The probe as it should be, the objects' size, and where its approaches aim. How many touches, the seed, the format
     /// and what a real probe adds make no difference.
     pub origin: Origin,
@@ -91,22 +91,22 @@ pub struct Settings {
     pub seed: u64,
 }
 
-impl Default for Settings {
+impl Default for FitSettings {
     fn default() -> Self {
         Self { origin: Origin::default(), approaches: 200_000, seed: 1 }
     }
 }
 
 /// The fewest recorded touches with two or three contacts from which a probe is fitted.
-pub(crate) const LEAST: usize = 20;
+pub(crate) const MIN_TOUCHES: usize = 20;
 
 /// Recordings and simulated touches, with which a candidate is compared.
 struct Evidence<'a> {
     recordings: &'a [Recording<'a>],
     /// Simulated touches of all objects.
     objects: &'a [Densities],
-    /// For each recording its object.
-    of: Vec<usize>,
+    /// For each recording the index of its object.
+    object_of: Vec<usize>,
     plate: Option<Plate>,
     stroke: Stroke,
 }
@@ -114,11 +114,11 @@ struct Evidence<'a> {
 impl Evidence<'_> {
     /// The logarithm of the likelihood of the recordings and of the plate, with how usual the candidate is.
     fn log_likelihood(&self, candidate: &Hypothesis) -> f64 {
-        let of = |(recording, object): (&Recording<'_>, &usize)| {
+        let likelihood = |(recording, object): (&Recording<'_>, &usize)| {
             recording.log_likelihood(&Explained::new(candidate, &self.objects[*object], recording.kept))
         };
         let plate = self.plate.as_ref().map_or(0.0, |plate| plate.log_likelihood(candidate));
-        self.recordings.iter().zip(&self.of).map(of).sum::<f64>() + plate + candidate.usual()
+        self.recordings.iter().zip(&self.object_of).map(likelihood).sum::<f64>() + plate + candidate.usual()
     }
 }
 
@@ -130,14 +130,14 @@ impl Evidence<'_> {
 /// processor for ten meshes and 300 recorded approaches to four of them, twice that where touches have poses.
 ///
 /// # Errors
-/// A recorded object that is not among the objects; fewer than [`LEAST`] touches with two or three contacts; recordings that
+/// A recorded object that is not among the objects; fewer than 20 touches with two or three contacts; recordings that
 /// show another stroke than the probe states; errors of [`crate::capture::touches`];
 /// [`Kind::Cancelled`](crate::error::Kind::Cancelled).
 pub fn fit(
     recorded: &Dataset,
     objects: &[Object],
     plate: Option<&[Touch]>,
-    settings: &Settings,
+    settings: &FitSettings,
     progress: &dyn Progress,
 ) -> Result<Fit> {
     let scenes = scenes(objects, settings, progress)?;
@@ -147,16 +147,16 @@ pub fn fit(
     let delivered = recorded.delivered_by(&settings.origin.probe);
     let recorded = delivered.as_ref();
     let touched = touched::touched(objects, scenes, recorded);
-    let of = useful(recorded, &touched, plate)?;
+    let object_of = useful(recorded, &touched, plate)?;
     progress.begin("fitting", None);
     let kept = kept(recorded);
-    let known: Vec<&Touched> = of.iter().map(|&place| &touched[place]).collect();
+    let known: Vec<&Touched> = object_of.iter().map(|&object| &touched[object]).collect();
     let samples = layer::samples(&known, settings);
     let rigid: Vec<Vec<Touch>> = samples.iter().map(|samples| samples.touches(&Noise::default())).collect();
     let rigid: Vec<&[Touch]> = rigid.iter().map(Vec::as_slice).collect();
     let stroke = stroke::stroke(recorded, &rigid, kept, &settings.origin.probe)?;
     let recordings: Vec<Recording<'_>> =
-        recorded.objects.iter().map(|own| Recording::without_poses(&own.name, own.touches(), kept)).collect();
+        recorded.objects.iter().map(|object| Recording::without_poses(&object.name, object.touches(), kept)).collect();
     let pressed = plate.map(|touches| Plate::new(touches.iter().map(Observed::of)));
     let layer = layer::layer(&recordings, samples, pressed.as_ref(), stroke, progress)?;
     let simulated = Simulated::new(touched, layer, settings, progress)?;
@@ -166,28 +166,29 @@ pub fn fit(
 
 /// Refuses recordings whose times are longer than a probe of the nominal speed takes over the largest object.
 fn check_times(recorded: &Dataset, scenes: &[Vec<Scene>], origin: &Origin) -> Result<()> {
-    let way = scenes.iter().flatten().map(|scene| {
+    let paths = scenes.iter().flatten().map(|scene| {
         let [low, high] = scene.bounds();
         (high - low).length() + 2.0 * origin.clearance([low, high])
     });
-    let (speed, seconds) = (origin.probe.speed, way.fold(0.0, f64::max) / origin.probe.speed);
+    let (speed, seconds) = (origin.probe.speed, paths.fold(0.0, f64::max) / origin.probe.speed);
     let longest = Longest::of_scale("the simulation", seconds, speed, origin.unit);
     recorded.objects.iter().try_for_each(|object| object.check_times(&longest))
 }
 
 /// The object or placement of each recording, if there are enough touches.
 fn useful(recorded: &Dataset, touched: &[Touched], plate: Option<&[Touch]>) -> Result<Vec<usize>> {
-    let place = |own: &ObjectTouches| place(&own.name, touched.iter().map(|touched| touched.name.as_str()));
-    let of: Vec<usize> = recorded.objects.iter().map(place).collect::<Result<_>>()?;
+    let place = |object: &ObjectTouches| place(&object.name, touched.iter().map(|touched| touched.name.as_str()));
+    let object_of: Vec<usize> = recorded.objects.iter().map(place).collect::<Result<_>>()?;
     let useful = |touch: &&Touch| Observed::of(touch).contacts() >= 2;
     let found = recorded.touches().chain(plate.into_iter().flatten()).filter(useful).count();
-    if found < LEAST {
-        let few =
-            problem!("only {found} recorded touches with two or three contacts, and a fit needs at least {LEAST}");
+    if found < MIN_TOUCHES {
+        let few = problem!(
+            "only {found} recorded touches with two or three contacts, and a fit needs at least {MIN_TOUCHES}"
+        );
         return Err(few
             .fix("Record a few hundred approaches to objects whose meshes you have; 60 presses on a plate help too."));
     }
-    Ok(of)
+    Ok(object_of)
 }
 
 /// Like [`fit`], to simulated touches and their densities.
@@ -197,33 +198,33 @@ fn fit_to(
     stroke: Stroke,
     recorded: &Dataset,
     plate: Option<&[Touch]>,
-    settings: &Settings,
+    settings: &FitSettings,
     progress: &dyn Progress,
 ) -> Result<Fit> {
     let Simulated { touched, layer, .. } = simulated;
-    let place = |own: &ObjectTouches| place(&own.name, objects.iter().map(|own| own.name.as_str()));
-    let of: Vec<usize> = recorded.objects.iter().map(place).collect::<Result<_>>()?;
+    let place = |recording: &ObjectTouches| place(&recording.name, objects.iter().map(|object| object.name.as_str()));
+    let object_of: Vec<usize> = recorded.objects.iter().map(place).collect::<Result<_>>()?;
     let kept = kept(recorded);
-    let recordings = recorded.objects.iter().zip(&of).map(|(own, &object)| Recording {
-        in_poses: posed::in_poses(&own.name, own.touches(), &touched[object], &layer.real, settings),
-        ..Recording::without_poses(&own.name, own.touches(), kept)
+    let recordings = recorded.objects.iter().zip(&object_of).map(|(recorded, &object)| Recording {
+        in_poses: posed::in_poses(&recorded.name, recorded.touches(), &touched[object], &layer.real, settings),
+        ..Recording::without_poses(&recorded.name, recorded.touches(), kept)
     });
     let recordings: Vec<Recording<'_>> = recordings.collect();
     let evidence = Evidence {
         recordings: &recordings,
         objects,
-        of,
+        object_of,
         plate: plate.map(|touches| Plate::new(touches.iter().map(Observed::of))),
         stroke,
     };
     progress.begin("fitting", None);
-    evidence.of.par_iter().for_each(|&object| evidence.objects[object].prepare());
+    evidence.object_of.par_iter().for_each(|&object| evidence.objects[object].prepare());
     let all = || recorded.touches().chain(plate.into_iter().flatten());
     let timer = timer::timer(all());
     let (best, ends) = searched(&evidence, layer.candidate, progress)?;
     // The intervals of the search suppose the layer as it was found.
     let center = best.candidate.numbers();
-    let widened = |(index, ends): (usize, search::Ends)| ends.widened(index, center[index], layer.adds[index]);
+    let widened = |(index, ends): (usize, search::Ends)| ends.widened(index, center[index], layer.widening[index]);
     let ends: Vec<search::Ends> = ends.into_iter().enumerate().map(widened).collect();
     let mut fit = outcome::outcome(&evidence, &best, &ends, layer, timer, settings);
     fit.readings = timer::readings(all(), timer).map(|micros| micros / 1e3);
@@ -243,7 +244,7 @@ fn place<'a>(name: &str, known: impl Iterator<Item = &'a str> + Clone) -> Result
 /// The approaches that were recorded, as far as the touches say: every one if some touched nothing, only full touches
 /// if there are no others.
 fn kept(recorded: &Dataset) -> Counted {
-    let any = |is: fn(&Touch) -> bool| recorded.touches().any(is);
+    let any = |condition: fn(&Touch) -> bool| recorded.touches().any(condition);
     match (any(Touch::is_empty), any(|touch| !touch.is_full())) {
         (true, _) => Counted::All,
         (false, true) => Counted::Contacts,
@@ -252,7 +253,7 @@ fn kept(recorded: &Dataset) -> Counted {
 }
 
 /// Each object's instances.
-fn scenes(objects: &[Object], settings: &Settings, progress: &dyn Progress) -> Result<Vec<Vec<Scene>>> {
+fn scenes(objects: &[Object], settings: &FitSettings, progress: &dyn Progress) -> Result<Vec<Vec<Scene>>> {
     if settings.approaches < 1_000 {
         return Err(Error::setting("approaches", settings.approaches, "1000 or more"));
     }
@@ -268,26 +269,26 @@ struct Simulated {
 }
 
 impl Simulated {
-    fn new(touched: Vec<Touched>, layer: Layer, settings: &Settings, progress: &dyn Progress) -> Result<Self> {
+    fn new(touched: Vec<Touched>, layer: Layer, settings: &FitSettings, progress: &dyn Progress) -> Result<Self> {
         // What the hand does not reach is left out later, when a candidate says how fast it is.
         let probe = with!(settings.origin.probe, stroke = None, stroke_tolerance = None);
         let (touches, seed) = (settings.approaches, settings.seed);
         let origin = Origin { approaches: true, touches, seed, real: layer.real, probe, ..settings.origin.clone() };
         progress.begin("touching", Some(touched.len() as u64));
-        let one = |own: &Touched| {
-            let touches = capture::touches(&own.scenes, &own.name, &origin, 0..settings.approaches)?;
+        let touches_of = |object: &Touched| {
+            let touches = capture::touches(&object.scenes, &object.name, &origin, 0..settings.approaches)?;
             progress::advance(progress, 1)?;
-            let is_weighed = own.weights.iter().any(|weight| *weight != own.weights[0]);
+            let is_weighed = object.weights.iter().any(|weight| *weight != object.weights[0]);
             Ok(if is_weighed { touches.as_often_as_placed() } else { touches })
         };
-        let touches = touched.iter().map(one).collect::<Result<_>>()?;
+        let touches = touched.iter().map(touches_of).collect::<Result<_>>()?;
         Ok(Self { touches, touched, layer })
     }
 
     /// The densities of the touches where the recordings have this stroke.
     fn densities(&self, stroke: Stroke) -> Vec<Densities> {
-        let of = |own: &ObjectTouches| Densities::new(&own.name, own.touches(), stroke.window);
-        self.touches.iter().map(of).collect()
+        let densities = |object: &ObjectTouches| Densities::new(&object.name, object.touches(), stroke.window);
+        self.touches.iter().map(densities).collect()
     }
 }
 
@@ -298,7 +299,7 @@ fn searched(
     progress: &dyn Progress,
 ) -> Result<(Best, Vec<search::Ends>)> {
     let likelihood = |candidate: &Hypothesis| match progress.is_cancelled() {
-        // As bad as can be, and so soon over.
+        // The worst likelihood, so that the search ends soon.
         true => f64::NEG_INFINITY,
         false => evidence.log_likelihood(candidate),
     };

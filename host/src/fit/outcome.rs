@@ -1,10 +1,10 @@
 //! Results of a fit, and the probe file that states it.
 
 use super::candidate::Hypothesis;
-use super::layer::{Layer, MOST_ANGLE};
+use super::layer::{Layer, MAX_ANGLE};
 use super::search::{Best, Ends};
 use super::words::{Estimate, NOT_TOLD, between, offset, offset_between};
-use super::{Evidence, Settings, Timer};
+use super::{Evidence, FitSettings, Timer};
 use crate::probe::approach::{FINGERS, Probe};
 use crate::probe::hand;
 use crate::probe::noise::Noise;
@@ -89,7 +89,7 @@ pub(super) fn outcome(
     ends: &[Ends],
     layer: &Layer,
     timer: Timer,
-    settings: &Settings,
+    settings: &FitSettings,
 ) -> Fit {
     let resolution = match timer {
         Timer::Found(micros) => Some(micros / 1e3),
@@ -131,7 +131,7 @@ pub(super) fn outcome(
         grazing: bends.then_some(GrazingEstimate {
             angle: {
                 let Estimate { value, low, high } = layered(&|real| real.grazing.angle);
-                Estimate { value, low: low.filter(|low| *low > 0.0), high: high.filter(|high| *high < MOST_ANGLE) }
+                Estimate { value, low: low.filter(|low| *low > 0.0), high: high.filter(|high| *high < MAX_ANGLE) }
             },
             bend: layered(&|real| real.grazing.bend / 1e3),
         }),

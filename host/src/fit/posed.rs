@@ -4,7 +4,7 @@
 //! then touched at a known slope, which tells offsets and speed far better. Poses are never exact and such approaches few,
 //! so a share of the density stays that of all poses.
 
-use super::Settings;
+use super::FitSettings;
 use super::candidate::Hypothesis;
 use super::likelihood::{Explained, product};
 use super::observed::{FULL, Observed};
@@ -23,7 +23,7 @@ use rayon::prelude::*;
 const APPROACHES: usize = 160;
 /// The share of a touch's density that comes from approaches in its pose.
 const TRUSTED: f64 = 0.8;
-/// By how much of their distance from 0 simulated times are smoothed: poses are not exact.
+/// Width that simulated times are smoothed by, as a share of their distance from 0: poses are not exact.
 const SMOOTHING: f64 = 0.06;
 /// Number of the neighbor that an approach is smoothed toward: there are few, and gaps between them must not be taken
 /// for noise.
@@ -44,7 +44,7 @@ struct Simulated {
     touched: u8,
     /// Contact times in milliseconds.
     times: [f32; 3],
-    /// Width by which the differences of times are smoothed, in milliseconds: half the way to its third neighbor with
+    /// Width by which the differences of times are smoothed, in milliseconds: half the distance to its third neighbor with
     /// the same contacts. Method: Breiman, Meisel and Purcell, Variable kernel estimates of multivariate densities,
     /// Technometrics 19 (1977).
     gap: f32,
@@ -57,13 +57,13 @@ pub(super) fn in_poses(
     touches: &[Touch],
     touched: &Touched,
     layer: &Noise,
-    settings: &Settings,
+    settings: &FitSettings,
 ) -> Vec<Option<InPose>> {
     if touches.iter().all(|touch| touch.pose().is_none()) || touched.scenes.is_empty() {
         return Vec::new();
     }
     let order = order(&touched.shares());
-    let one = |(index, touch): (usize, &Touch)| {
+    let in_pose = |(index, touch): (usize, &Touch)| {
         let mut random = random::generator(settings.seed, Purpose::Fit, name, 1 + index as u64);
         let pose = touch.pose()?;
         let approaches = order.iter().map(|&scene| {
@@ -85,14 +85,14 @@ pub(super) fn in_poses(
         approaches.retain(|approach| approach.touched & fingers == fingers);
         Some(InPose { explaining: approaches, count })
     };
-    touches.par_iter().enumerate().map(one).collect()
+    touches.par_iter().enumerate().map(in_pose).collect()
 }
 
-/// The scene of each approach: each as often as its share says, in turn where all have the same.
+/// Deals approaches to scenes in proportion to their shares, in turn where all shares are equal.
 fn order(shares: &[f64]) -> Vec<usize> {
     let mut due: Vec<f64> = shares.to_vec();
     let mut next = || {
-        // The first of those that have waited the longest.
+        // The scene whose approaches are the most overdue, the first of several.
         let scene = (0..due.len()).fold(0, |best, scene| if due[scene] > due[best] { scene } else { best });
         due[scene] -= shares.iter().sum::<f64>();
         due.iter_mut().zip(shares).for_each(|(due, share)| *due += share);
@@ -101,16 +101,16 @@ fn order(shares: &[f64]) -> Vec<usize> {
     (0..APPROACHES).map(|_| next()).collect()
 }
 
-/// Half the way to the third neighbor with the same contacts; 0 where there are not as many.
-fn gap(one: &Simulated, all: &[Simulated]) -> f32 {
+/// Half the distance to the third nearest approach with the same contacts; 0 if there are fewer.
+fn gap(approach: &Simulated, all: &[Simulated]) -> f32 {
     // Times of fingers that did not touch are 0, and so is their contribution here.
     let away = |other: &Simulated| {
-        let [a, b, c]: [f32; 3] = std::array::from_fn(|finger| other.times[finger] - one.times[finger]);
-        let touched = |fingers: u8| one.touched & fingers == fingers;
+        let [a, b, c]: [f32; 3] = std::array::from_fn(|finger| other.times[finger] - approach.times[finger]);
+        let touched = |fingers: u8| approach.touched & fingers == fingers;
         let differences = [(0b011, b - a), (0b110, c - b), (0b101, c - a)];
         differences.iter().map(|(fingers, away)| if touched(*fingers) { away.abs() } else { 0.0 }).fold(0.0, f32::max)
     };
-    let mut neighbors: Vec<f32> = all.iter().filter(|other| other.touched == one.touched).map(away).collect();
+    let mut neighbors: Vec<f32> = all.iter().filter(|other| other.touched == approach.touched).map(away).collect();
     // The nearest is the approach itself.
     if neighbors.len() <= NEIGHBOR {
         return 0.0;
@@ -118,8 +118,8 @@ fn gap(one: &Simulated, all: &[Simulated]) -> f32 {
     *neighbors.select_nth_unstable_by(NEIGHBOR, f32::total_cmp).1 / 2.0
 }
 
-/// An approach in this pose, aimed as the robot aims.
-fn aimed(random: &mut impl Rng, pose: &Pose, scene: &Scene, settings: &Settings) -> Approach {
+/// Draws an approach in this pose, aimed like those of the robot.
+fn aimed(random: &mut impl Rng, pose: &Pose, scene: &Scene, settings: &FitSettings) -> Approach {
     let vector = |cosines: [i16; 3]| {
         DVec3::from_array(cosines.map(|cosine| f64::from(cosine) / f64::from(Q15_ONE))).normalize_or(DVec3::Z)
     };
@@ -161,8 +161,8 @@ pub(super) fn log_density(explained: &Explained<'_>, observed: &Observed, in_pos
     let all = explained.log_density(observed);
     let Some(density) = density(explained, observed, in_pose) else { return all };
     let posed = density.ln() - explained.recorded;
-    let most = posed.max(all);
-    most + (TRUSTED * (posed - most).exp() + (1.0 - TRUSTED) * (all - most).exp()).ln()
+    let larger = posed.max(all);
+    larger + (TRUSTED * (posed - larger).exp() + (1.0 - TRUSTED) * (all - larger).exp()).ln()
 }
 
 /// The density among the approaches in its pose; none if none of them can explain the touch, whatever the candidate. Where one
@@ -214,8 +214,8 @@ fn density(explained: &Explained<'_>, observed: &Observed, in_pose: &InPose) -> 
                 FULL => {
                     let [a, b, c] = [seen(0), seen(1), seen(2)];
                     let (curvature, slope) = (a - 2.0 * b + c, c - a);
-                    let (one, other) = (apart(curvature, observed.first, 6.0), apart(slope, observed.second, 2.0));
-                    (-0.5 * (one.0 + other.0)).exp() / (one.1 * other.1).sqrt()
+                    let (bend, tilt) = (apart(curvature, observed.first, 6.0), apart(slope, observed.second, 2.0));
+                    (-0.5 * (bend.0 + tilt.0)).exp() / (bend.1 * tilt.1).sqrt()
                 }
                 0b011 => kernel(seen(1) - seen(0), observed.first),
                 0b110 => kernel(seen(2) - seen(1), observed.first),

@@ -29,32 +29,35 @@ struct Bench {
 }
 
 impl Bench {
-    fn of(&self, dataset: &Dataset) -> Vec<usize> {
+    fn object_of(&self, dataset: &Dataset) -> Vec<usize> {
         dataset
             .objects
             .iter()
-            .map(|own| place(&own.name, self.objects.iter().map(|object| object.name.as_str())).unwrap())
+            .map(|recording| place(&recording.name, self.objects.iter().map(|object| object.name.as_str())).unwrap())
             .collect()
     }
 
     /// The fit, and the log-densities of other touches under it.
     fn fitted(&self, recorded: &Dataset, plate: Option<&[Touch]>, held: &Dataset) -> (Best, Vec<f64>) {
-        let (of, kept) = (self.of(recorded), kept(recorded));
-        let recordings: Vec<Recording<'_>> =
-            recorded.objects.iter().map(|own| Recording::without_poses(&own.name, own.touches(), kept)).collect();
+        let (object_of, kept) = (self.object_of(recorded), kept(recorded));
+        let recordings: Vec<Recording<'_>> = recorded
+            .objects
+            .iter()
+            .map(|object| Recording::without_poses(&object.name, object.touches(), kept))
+            .collect();
         let evidence = Evidence {
             recordings: &recordings,
             objects: &self.densities,
-            of,
+            object_of,
             plate: plate.map(|touches| Plate::new(touches.iter().map(Observed::of))),
             stroke: Stroke::default(),
         };
         let best = search::best(&|candidate: &Hypothesis| evidence.log_likelihood(candidate), None);
-        let densities = |(own, object): (&ObjectTouches, usize)| {
+        let densities = |(held, object): (&ObjectTouches, usize)| {
             let explained = Explained::new(&best.candidate, &self.densities[object], kept);
-            own.touches().iter().map(|touch| explained.log_density(&Observed::of(touch))).collect::<Vec<f64>>()
+            held.touches().iter().map(|touch| explained.log_density(&Observed::of(touch))).collect::<Vec<f64>>()
         };
-        let held = held.objects.iter().zip(self.of(held)).flat_map(densities).collect();
+        let held = held.objects.iter().zip(self.object_of(held)).flat_map(densities).collect();
         (best, held)
     }
 }
@@ -70,8 +73,8 @@ fn a_plate_makes_no_fit_to_compliant_robots_worse() {
     }
     let sets = repetitions(1).min(4) as usize;
     let settings = match sets {
-        1 => Settings { approaches: 60_000, ..Settings::default() },
-        _ => Settings::default(),
+        1 => FitSettings { approaches: 60_000, ..FitSettings::default() },
+        _ => FitSettings::default(),
     };
     let objects = source::objects(&[shared.join("objects").to_str().unwrap().into()]).unwrap();
     let scenes = scenes(&objects, &settings, &()).unwrap();

@@ -120,8 +120,8 @@ fn plate(count: usize, probe: &Crooked) -> Vec<Touch> {
     (0..count).map(press).collect()
 }
 
-fn settings() -> Settings {
-    Settings { approaches: 20_000, ..Settings::default() }
+fn settings() -> FitSettings {
+    FitSettings { approaches: 20_000, ..FitSettings::default() }
 }
 
 /// Touches of rigid fingers, made once for all fits to them, and their densities where no stroke ends them.
@@ -154,7 +154,7 @@ fn fitted(recorded: &Dataset, plate: Option<&[Touch]>) -> Fit {
 
 /// The fit of an unknown probe.
 fn layered(recorded: &Dataset, plate: Option<&[Touch]>) -> Fit {
-    fit(recorded, &objects(), plate, &Settings { approaches: 12_000, ..settings() }, &()).unwrap()
+    fit(recorded, &objects(), plate, &FitSettings { approaches: 12_000, ..settings() }, &()).unwrap()
 }
 
 /// Asserts that the values are near the probe's, and within the intervals except for an error of the simulation.
@@ -385,7 +385,7 @@ fn a_stated_stroke_is_kept_and_recordings_of_another_are_refused_with_both() {
     let stating = |stroke: f64| {
         let probe = with!(Probe::default(), stroke = Some(stroke));
         let origin = Origin { probe, ..Origin::default() };
-        fit(&short, &objects(), None, &Settings { origin, approaches: 4_000, ..settings() }, &())
+        fit(&short, &objects(), None, &FitSettings { origin, approaches: 4_000, ..settings() }, &())
     };
     let found = stating(3.0).unwrap();
     assert_eq!((found.stroke, found.probe.stroke), (None, Some(3.0)));
@@ -412,9 +412,9 @@ fn full_touches_and_poses_of_a_short_stroke_are_fitted_as_well() {
 
 /// Approaches from above to two objects on a table, in a recording of each placement that states it, or in one of each object
 /// that states none.
-fn tabled(count: usize, seed: u64, probe: &Crooked, is_stated: bool) -> (Dataset, Settings) {
+fn tabled(count: usize, seed: u64, probe: &Crooked, is_stated: bool) -> (Dataset, FitSettings) {
     let scene = Surroundings::Table { cone: 60.0 };
-    let settings = Settings { origin: Origin { scene, ..Origin::default() }, approaches: 12_000, ..settings() };
+    let settings = FitSettings { origin: Origin { scene, ..Origin::default() }, approaches: 12_000, ..settings() };
     let origin = Origin { approaches: true, seed: 1_000 + seed, ..settings.origin.clone() };
     let one = |object: &Object| {
         let scenes = capture::scenes(&[object], &origin, &()).unwrap();
@@ -468,6 +468,6 @@ fn the_file_of_an_estimated_stroke_states_how_far_contacts_may_be_behind_it() {
     // A later recording of the same hand, whose clock runs 1.5 % slow, is fitted with the file as well, and its late contacts are none.
     let later = stopped(&recorded(&objects(), 200, 7, &BENT), 253);
     let origin = Origin { probe: file.probe, ..Origin::default() };
-    let again = fit(&later, &objects(), None, &Settings { origin, approaches: 4_000, ..settings() }, &()).unwrap();
+    let again = fit(&later, &objects(), None, &FitSettings { origin, approaches: 4_000, ..settings() }, &()).unwrap();
     assert_eq!((again.stroke, again.probe), (None, file.probe));
 }

@@ -3,7 +3,7 @@
 use super::refused::{not_met, too_large};
 use super::register::recorded;
 use super::surface::{SAME, Surface, TABLE};
-use super::{Settings, Standing};
+use super::{CastSettings, Standing};
 use crate::error::{Error, Result, problem};
 use crate::probe::approach::Probe;
 use crate::touches::{Dataset, ObjectTouches, Pool};
@@ -22,7 +22,7 @@ const MOST: i32 = 250;
 ///
 /// # Errors
 /// When an object is too large for a map, or too flat to be felt.
-pub fn cast(standing: &[Standing], probe: &Probe, settings: &Settings) -> Result<Vec<Surface>> {
+pub fn cast(standing: &[Standing], probe: &Probe, settings: &CastSettings) -> Result<Vec<Surface>> {
     let of = |(object, stands): (usize, &Standing)| {
         let looks: Vec<_> = stands.looks().collect();
         let cast = |&(lying, share): &(&super::Lying, f64)| {
@@ -45,13 +45,13 @@ pub fn cast(standing: &[Standing], probe: &Probe, settings: &Settings) -> Result
 ///
 /// # Errors
 /// When touches have no position, the probe is not in millimeters, or an object was not met.
-pub fn learn(dataset: &Dataset, settings: &Settings) -> Result<Vec<Surface>> {
+pub fn learn(dataset: &Dataset, settings: &CastSettings) -> Result<Vec<Surface>> {
     let probe = probe_of(dataset)?;
     let of = |(object, touches)| of_object(object, touches, &probe, settings);
     Ok(dataset.objects.par_iter().enumerate().map(of).collect::<Result<Vec<_>>>()?.concat())
 }
 
-fn of_object(object: usize, touches: &ObjectTouches, probe: &Probe, settings: &Settings) -> Result<Vec<Surface>> {
+fn of_object(object: usize, touches: &ObjectTouches, probe: &Probe, settings: &CastSettings) -> Result<Vec<Surface>> {
     if let Some(touch) = touches.touches().iter().position(|touch| touch.position().is_none()) {
         return Err(problem!("{}: touch {} has no position", touches.name, touch + 1)
             .fix("State the position of every touch, or of none: the last three columns of a line."));

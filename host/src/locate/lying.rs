@@ -8,22 +8,22 @@ use rayon::prelude::*;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-/// Turns that are compared.
+/// Number of turns at which two poses are compared.
 pub(super) const TURNS: usize = 120;
-/// Turns among these that are tried exactly.
+/// Number of these turns, the most similar ones, that are compared exactly.
 const TRIED: usize = 4;
-/// Cells along a side on which poses are compared.
+/// Number of cells along the longest side of the grid on which poses are compared.
 const CELLS: f64 = 30.0;
-/// Areas at which their profiles are compared.
+/// Number of areas at which the profiles of two poses are compared.
 const AREAS: usize = 100;
-/// Profiles of poses that look the same differ by no more than this beyond the limit, in millimeters: cells are coarse.
+/// Amount beyond the limit by which profiles of poses that look the same may differ, in millimeters: cells are coarse.
 const COARSE: f64 = 1.0;
-/// Another turn nearby cures no difference that is larger by this, in millimeters.
+/// A difference that exceeds the limit by more than this is not lowered below it by a turn nearby, in millimeters.
 const HOPELESS: f64 = 3.0;
-/// Poses that differ by less look the same without a closer look, in millimeters.
+/// Poses that differ by less look the same without further comparison, in millimeters.
 const EQUAL: f64 = 0.05;
 
-/// A compared turn.
+/// A compared turn as an angle.
 pub(super) fn radians(turn: usize) -> f64 {
     turn as f64 / TURNS as f64 * TAU
 }
@@ -64,8 +64,8 @@ impl Lying {
         let [low, high] = self.bounds;
         let start = DVec3::new((low.x + high.x) / 2.0 + x, (low.y + high.y) / 2.0 + y, high.z + 2.0 * radius);
         let back = self.rotation.transpose();
-        let way = self.scene.first_contact(back * start, back * DVec3::NEG_Z, radius);
-        way.map_or(0.0, |way| (start.z - way - radius - low.z).max(0.0))
+        let distance = self.scene.first_contact(back * start, back * DVec3::NEG_Z, radius);
+        distance.map_or(0.0, |distance| (start.z - distance - radius - low.z).max(0.0))
     }
 }
 
@@ -84,8 +84,8 @@ impl Onto {
     }
 
     /// A point of the pose, in the other's frame.
-    fn of(&self, at: [f64; 2]) -> [f64; 2] {
-        let [x, y] = turned(at, self.turn);
+    fn forth(&self, point: [f64; 2]) -> [f64; 2] {
+        let [x, y] = turned(point, self.turn);
         [x + self.shift[0], y + self.shift[1]]
     }
 
@@ -133,11 +133,11 @@ impl<'p> View<'p> {
 
     /// Mean difference of the heights that each area rises above. On the same footprint, heights differ by no less at any turn.
     fn apart(&self, other: &Self) -> f64 {
-        let most = self.area().max(other.area());
+        let larger = self.area().max(other.area());
         let above = |view: &Self, area: f64| {
             view.profile.get((area / view.surface.cell.powi(2)) as usize).copied().unwrap_or(0.0)
         };
-        let areas = (0..AREAS).map(|number| most * (number as f64 + 0.5) / AREAS as f64);
+        let areas = (0..AREAS).map(|number| larger * (number as f64 + 0.5) / AREAS as f64);
         areas.map(|area| (above(self, area) - above(other, area)).abs()).sum::<f64>() / AREAS as f64
     }
 
@@ -148,23 +148,25 @@ impl<'p> View<'p> {
             return None;
         }
         let onto = |turn| Onto::about([self.middle, other.middle], turn);
-        let guesses: Vec<f64> =
-            (0..TURNS).map(|turn| other.surface.off(|at| self.surface.near(onto(radians(turn)).of(at)))).collect();
-        let is_least = |turn: &usize| [1, TURNS - 1].iter().all(|by| guesses[*turn] <= guesses[(turn + by) % TURNS]);
-        let mut turns: Vec<usize> = (0..TURNS).filter(is_least).collect();
+        let guesses: Vec<f64> = (0..TURNS)
+            .map(|turn| other.surface.off(|point| self.surface.near(onto(radians(turn)).forth(point))))
+            .collect();
+        let is_minimum =
+            |turn: &usize| [1, TURNS - 1].iter().all(|step| guesses[*turn] <= guesses[(turn + step) % TURNS]);
+        let mut turns: Vec<usize> = (0..TURNS).filter(is_minimum).collect();
         turns.sort_by(|one, other| guesses[*one].total_cmp(&guesses[*other]));
-        // Each is seen from the other: one may be a part of the other.
+        // Both ways: one of them may look like a part of the other.
         let exact = |turn: f64| {
             let onto = onto(turn);
-            let from_other = other.surface.off(|at| self.pose.height(onto.of(at), radius));
-            from_other.max(self.surface.off(|at| other.pose.height(onto.back(at), radius)))
+            let from_other = other.surface.off(|point| self.pose.height(onto.forth(point), radius));
+            from_other.max(self.surface.off(|point| other.pose.height(onto.back(point), radius)))
         };
         let tried = turns.into_iter().take(TRIED).map(|turn| {
             let mut best = (exact(radians(turn)), radians(turn));
             let mut step = radians(1) / 2.0;
             while step > radians(1) / 20.0 && (EQUAL..limit + HOPELESS).contains(&best.0) {
                 let about = [best.1 - step, best.1 + step].map(|turn| (exact(turn), turn));
-                best = about.into_iter().fold(best, |best, own| if own.0 < best.0 { own } else { best });
+                best = about.into_iter().fold(best, |best, next| if next.0 < best.0 { next } else { best });
                 step /= 2.0;
             }
             best
@@ -174,8 +176,9 @@ impl<'p> View<'p> {
     }
 }
 
-/// Poses of an object, those that look the same one after the other, by descending share of what they look like; and what is left out
-/// since it is rare, by name and share. Poses look the same if no turn tells them apart with contacts of this noise, in millimeters.
+/// Groups the poses of an object that look the same, and sorts the groups by descending share; returns as well the name and share
+/// of each group that is left out because it is rare. Poses look the same if contacts of this noise, in millimeters, tell them
+/// apart at no turn.
 pub(super) fn grouped(mut poses: Vec<Lying>, radius: f64, noise: f64) -> (Vec<Lying>, Vec<(String, f64)>) {
     let limit = (1.5 * noise).max(0.2);
     let views: Vec<View<'_>> = poses.par_iter().map(|pose| View::new(pose, radius)).collect();
@@ -199,9 +202,9 @@ pub(super) fn grouped(mut poses: Vec<Lying>, radius: f64, noise: f64) -> (Vec<Ly
     let left_out = rare.into_iter().map(|(first, share)| (poses[first].name.clone(), share)).collect();
     let mut all: Vec<Lying> = Vec::new();
     for (first, _) in shares {
-        let at = all.len();
-        let own = poses.iter().filter(|pose| pose.first == first);
-        all.extend(own.map(|pose| Lying { first: at, ..pose.clone() }));
+        let position = all.len();
+        let group = poses.iter().filter(|pose| pose.first == first);
+        all.extend(group.map(|pose| Lying { first: position, ..pose.clone() }));
     }
     (all, left_out)
 }

@@ -53,7 +53,7 @@ use crate::error::{Error, Result};
 /// Settings of a model of maps.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
-pub struct Settings {
+pub struct CastSettings {
     /// Cells of 1 mm, otherwise of 2 mm: a quarter of the bytes.
     pub fine: bool,
     /// Half of the side of the square in which an object's origin is looked for, in millimeters.
@@ -80,7 +80,7 @@ pub struct Settings {
     pub max_touches: u32,
 }
 
-impl Default for Settings {
+impl Default for CastSettings {
     fn default() -> Self {
         Self {
             fine: true,
@@ -99,7 +99,7 @@ impl Default for Settings {
     }
 }
 
-impl Settings {
+impl CastSettings {
     /// These settings for noise that is stated; what it leaves open stays.
     #[must_use]
     pub fn expecting(self, real: &Real) -> Self {

@@ -154,7 +154,7 @@ fn the_surface_is_closed_to_the_table_and_as_large_as_the_object() {
 
 #[test]
 fn recordings_of_several_places_are_one_surface_where_the_follower_is_sure() {
-    let settings = Settings::default();
+    let settings = CastSettings::default();
     let once = recorded("pot", &[pressed([0.0; 2], 0.0, 150, ell)], &probe(), &settings).unwrap();
     let places = [pressed([0.0; 2], 0.0, 150, ell), pressed([12.0, -9.0], 0.9, 150, ell)];
     let both = recorded("pot", &places, &probe(), &settings).unwrap();
@@ -165,7 +165,7 @@ fn recordings_of_several_places_are_one_surface_where_the_follower_is_sure() {
 
 #[test]
 fn recordings_are_not_merged_where_the_pose_is_not_sure() {
-    let settings = Settings::default();
+    let settings = CastSettings::default();
     // The same from both ends, and another placement.
     let bar = |[x, y]: [f64; 2]| if (0.0..=60.0).contains(&x) && (0.0..=20.0).contains(&y) { 15.0 } else { 0.0 };
     for surface in [bar, |at: [f64; 2]| ell(at) / 2.0] {
@@ -192,7 +192,7 @@ fn a_contact_that_strays_above_the_table_moves_no_objects_middle() {
         }
         touches
     };
-    let settings = Settings::default();
+    let settings = CastSettings::default();
     for (place, stray) in [([0.0; 2], [-53.7, -6.9]), ([4.0, -9.0], [10.0, 50.0]), ([4.0, -9.0], [-40.0, -40.0])] {
         let [clean, strayed] = [None, Some(stray)].map(|stray| {
             let samples = shape::all_samples(&of(place, stray), &probe()).unwrap();
@@ -229,7 +229,7 @@ fn an_object_learned_on_the_table_is_recognized_beside_one_with_a_mesh() {
     let mut puck = Object::new("puck", puck);
     puck.millimeters = Some(1.0);
     let pot = ObjectTouches::new("pot", pressed([0.0; 2], 0.0, 300, ell), Source::Object);
-    let settings = Settings::default();
+    let settings = CastSettings::default();
     let standing = standing(&[&puck], &probe(), settings.noise, &()).unwrap();
     let mut surfaces = cast(&standing, &probe(), &settings).unwrap();
     surfaces.iter_mut().for_each(|surface| surface.object = 1);
@@ -250,6 +250,6 @@ fn a_touch_without_a_position_is_named() {
     let mut touches = pressed([0.0; 2], 0.0, 3, ell);
     touches[1] = Touch::new([ContactTime::MISSING; 3]);
     let pot = dataset(vec![ObjectTouches::new("pot", touches, Source::Object)]);
-    let error = learn(&pot, &Settings::default()).unwrap_err();
+    let error = learn(&pot, &CastSettings::default()).unwrap_err();
     assert_eq!(error.what(), "pot: touch 2 has no position");
 }

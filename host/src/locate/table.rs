@@ -95,7 +95,7 @@ pub fn bare_table(presses: &[(Place, Touch)], probe: &Probe) -> Result<BareTable
         let is_certain = |inverse: &Square| {
             [3, 4]
                 .into_iter()
-                .all(|slope| inverse[(slope, slope)].sqrt() * super::Settings::default().noise * REACH <= BEARABLE)
+                .all(|slope| inverse[(slope, slope)].sqrt() * super::CastSettings::default().noise * REACH <= BEARABLE)
         };
         inverse = normal.try_inverse().filter(is_certain).ok_or_else(one_place)?;
         found = inverse * moment;

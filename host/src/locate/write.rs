@@ -1,6 +1,6 @@
 //! Surfaces as the bytes that the chip reads.
 
-use super::Settings;
+use super::CastSettings;
 use super::refused::{not_met, refused, too_large};
 use super::surface::Surface;
 use crate::compile::{self, OwnedSection, file, restated_file};
@@ -23,7 +23,7 @@ const WINDOWS: [i32; 4] = [4, 8, 16, 32];
 /// # Errors
 /// For an object without a surface, and for a name or a map that is too large; [`Kind::Setting`](crate::error::Kind::Setting) for
 /// settings out of range.
-pub fn write(surfaces: &[Surface], objects: &[String], probe: &Probe, settings: &Settings) -> Result<Vec<u8>> {
+pub fn write(surfaces: &[Surface], objects: &[String], probe: &Probe, settings: &CastSettings) -> Result<Vec<u8>> {
     settings.check()?;
     if objects.is_empty() {
         return Err(
@@ -115,7 +115,7 @@ pub(super) struct Restated {
     pub(super) max_touches: u32,
     /// Least fit of each object, in 1/64 nat, as a test for unknown objects; none: no test.
     pub(super) least_fits: Vec<i16>,
-    /// See [`Settings::stretch`].
+    /// See [`CastSettings::stretch`].
     pub(super) stretch: u16,
     pub(super) promise: Option<Promise>,
 }
@@ -180,8 +180,8 @@ fn levels(surface: &Surface, bytes: &mut Vec<u8>, scale: u16) -> Vec<[i32; 2]> {
 }
 
 /// Logarithms of the likelihoods of contacts and of missing ones, in 1/64 nat.
-fn likelihoods(settings: &Settings) -> Vec<i16> {
-    let Settings { noise, lost, outliers, .. } = *settings;
+fn likelihoods(settings: &CastSettings) -> Vec<i16> {
+    let CastSettings { noise, lost, outliers, .. } = *settings;
     // Rounding to cells adds to the noise.
     let sigma = noise.hypot(settings.blur());
     let log = |likelihood: f64| (likelihood.max(1e-200).ln() * NAT).round().max(-32_000.0) as i16;

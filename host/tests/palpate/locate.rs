@@ -3,8 +3,8 @@
 use crate::fixtures::*;
 use palpate::calibrate as promises;
 use palpate::locate::{
-    Aimed, Approach, Maps, Real, Settings, Standing, TOUCHES, Terms, Until, World, calibrate, cast, evaluate, learn,
-    locating, standing, write,
+    Aimed, Approach, CastSettings, Maps, Real, Standing, TOUCHES, Terms, Until, World, calibrate, cast, evaluate,
+    learn, locating, standing, write,
 };
 use palpate::onboard::locate::{Contact, Seen};
 use palpate::play::Hidden;
@@ -46,14 +46,14 @@ fn names(standing: &[Standing]) -> Vec<String> {
     standing.iter().map(|object| object.name.clone()).collect()
 }
 
-fn model(settings: &Settings) -> Vec<u8> {
+fn model(settings: &CastSettings) -> Vec<u8> {
     write(&cast(&STANDING, &probe(), settings).unwrap(), &names(&STANDING), &probe(), settings).unwrap()
 }
 
 /// Maps with the usual settings.
-static MODEL: LazyLock<Vec<u8>> = LazyLock::new(|| model(&Settings::default()));
+static MODEL: LazyLock<Vec<u8>> = LazyLock::new(|| model(&CastSettings::default()));
 /// Coarser ones.
-static COARSE: LazyLock<Vec<u8>> = LazyLock::new(|| model(&with!(Settings::default(), fine = false)));
+static COARSE: LazyLock<Vec<u8>> = LazyLock::new(|| model(&with!(CastSettings::default(), fine = false)));
 
 fn terms(sequences: usize) -> Terms {
     Terms {
@@ -139,7 +139,7 @@ fn a_calibrated_model_states_its_promise_and_how_approaches_were_aimed() {
 fn an_object_that_moves_in_each_approach_takes_a_few_more() {
     let real = Real { drift: 1.0, drift_yaw: 1.0, ..Real::default() };
     let [still, moving] = [Real::default(), real].map(|real| {
-        let bytes = model(&Settings::default().expecting(&real));
+        let bytes = model(&CastSettings::default().expecting(&real));
         evaluate(Maps::new(&bytes).unwrap(), &STANDING, &probe(), &Terms { real, ..terms(60) }, &()).unwrap()
     });
     assert!(moving.mean_approaches < 2.0 * still.mean_approaches && moving.given >= 55, "{moving:?}, still {still:?}");
@@ -232,16 +232,16 @@ fn touches_without_a_position_and_other_units_are_refused() {
     let object = ObjectTouches::new("bar", vec![touch, bare], Source::Object);
     let origin = Origin { probe: probe(), unit: Length::Millimeter, ..Origin::default() };
     let mut dataset = Dataset { origin: Some(origin), ..Dataset::new(vec![object]) };
-    let error = learn(&dataset, &Settings::default()).unwrap_err().to_string();
+    let error = learn(&dataset, &CastSettings::default()).unwrap_err().to_string();
     assert!(error.contains("bar: touch 2 has no position"), "{error}");
     dataset.origin = None;
-    let error = learn(&dataset, &Settings::default()).unwrap_err().to_string();
+    let error = learn(&dataset, &CastSettings::default()).unwrap_err().to_string();
     assert!(error.contains("true size"), "{error}");
 }
 
 #[test]
 fn maps_of_no_object_and_of_one_without_a_surface_are_refused_by_name() {
-    let settings = Settings::default();
+    let settings = CastSettings::default();
     let error = write(&[], &[], &probe(), &settings).unwrap_err().to_string();
     assert!(error.contains("no objects"), "{error}");
     let surfaces = cast(&STANDING, &probe(), &settings).unwrap();
@@ -252,7 +252,7 @@ fn maps_of_no_object_and_of_one_without_a_surface_are_refused_by_name() {
 
 #[test]
 fn settings_out_of_range_are_refused_by_name() {
-    let settings = Settings::default();
+    let settings = CastSettings::default();
     for (wrong, name) in [
         (with!(settings.clone(), range = 200.0), "range"),
         (with!(settings.clone(), noise = f64::NAN), "noise"),
@@ -302,11 +302,11 @@ fn poses_on_many_facets_have_one_map_and_none_is_lost_since_each_is_rare() {
         assert!((looks.iter().map(|(_, share)| share).sum::<f64>() - 1.0).abs() < 1e-9);
         let of_trees = palpate::mesh::placements::placements(object.mesh()).unwrap().placements;
         assert_eq!(looks[0].0, of_trees[0].name);
-        let maps = cast(&standing, &probe(), &Settings::default()).unwrap();
+        let maps = cast(&standing, &probe(), &CastSettings::default()).unwrap();
         assert_eq!(maps.len(), looks.len());
         // What is played is each facet as it is, and it is found.
         let names = names(&standing);
-        let bytes = write(&maps, &names, &probe(), &Settings::default()).unwrap();
+        let bytes = write(&maps, &names, &probe(), &CastSettings::default()).unwrap();
         let until = Some(Until { millimeters: 6.0, degrees: 10.0 });
         let found =
             evaluate(Maps::new(&bytes).unwrap(), &standing, &probe(), &Terms { until, ..terms(20) }, &()).unwrap();
@@ -338,7 +338,7 @@ fn a_symmetric_object_without_a_middle_of_its_box_lies_in_one_way() {
 fn maps_of_meshes_are_the_same_on_any_number_of_threads() {
     let maps = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| cast(&stands(&objects()), &probe(), &Settings::default()).unwrap())
+        pool.install(|| cast(&stands(&objects()), &probe(), &CastSettings::default()).unwrap())
     };
     let [one, four] = [1, 4].map(|threads| format!("{:?}", maps(threads)));
     assert!(one == four);
@@ -348,7 +348,7 @@ fn maps_of_meshes_are_the_same_on_any_number_of_threads() {
 fn a_map_has_what_a_fingertip_meets_in_the_middle_of_each_cell() {
     let disc = turned("disc", 90, &[[20.0, 0.0], [20.0, 10.0]]);
     let standing = stands(&[disc]);
-    let maps = cast(&standing, &probe(), &Settings::default()).unwrap();
+    let maps = cast(&standing, &probe(), &CastSettings::default()).unwrap();
     let flat = maps.iter().find(|surface| surface.is_round).unwrap();
     let height = |i: i32, j: i32| {
         let [x, y] = flat.half;
@@ -366,7 +366,7 @@ fn an_object_that_is_too_large_or_too_flat_for_a_map_is_named() {
         let mut mesh = Mesh::globe(4);
         mesh.vertices.iter_mut().for_each(|vertex| *vertex = [0, 1, 2].map(|axis| half[axis] * vertex[axis]));
         let standing = stands(&[sized("slab", mesh)]);
-        let error = cast(&standing, &probe(), &Settings::default()).unwrap_err().to_string();
+        let error = cast(&standing, &probe(), &CastSettings::default()).unwrap_err().to_string();
         assert!(error.starts_with(expected), "{error}");
     }
 }
@@ -394,7 +394,7 @@ fn all_poses_of_a_mouse_on_its_back_have_a_map() {
         .collect();
     assert_eq!(back.len(), 4, "{back:?}");
     assert!(back.iter().all(|(_, share)| *share > 0.08), "{back:?}");
-    let maps = cast(&standing, &probe(), &Settings::default()).unwrap();
+    let maps = cast(&standing, &probe(), &CastSettings::default()).unwrap();
     let has_map = |name: &str| maps.iter().any(|surface| surface.placement == name);
     assert!(back.iter().all(|(name, _)| has_map(name)));
 }

@@ -4,28 +4,28 @@ use super::evidence::{ONE, Posterior, Rivals, Unit, best, ratio};
 use core::num::NonZeroU64;
 use palpate_shared::format::Outputs;
 
-/// The object that leads, and the weights of all, in units in which the output with the most evidence weighs 2^56.
+/// The leading object and the weights of all objects, in units in which the output with the most evidence weighs 2^56.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Leading {
     /// The object's output with the most evidence.
     pub(super) output: usize,
-    /// The sum over its outputs.
-    own: u64,
-    /// The sum over all others.
+    /// Weight of the object: the sum over its outputs.
+    weight: u64,
+    /// Weight of all other objects and the background.
     others: u64,
-    /// The background's.
+    /// Weight of the background.
     background: u64,
 }
 
 impl Leading {
-    /// The object, of those with an output below `known`, with the largest weight; the first of several.
+    /// Finds the object with the largest weight among those with an output below `known`, the first of several.
     ///
     /// Cost: an exponential for each output.
     pub(super) fn of(evidence: &[i64], known: usize, outputs: Outputs<'_>, unit: Unit) -> Self {
-        let (_, most) = best(evidence);
-        let weight = |evidence: i64| unit.weight(most.abs_diff(evidence));
+        let (_, strongest) = best(evidence);
+        let weight = |evidence: i64| unit.weight(strongest.abs_diff(evidence));
         let background = evidence.get(known).copied().map_or(0, weight);
-        let mut leading = Self { output: 0, own: 0, others: background, background };
+        let mut leading = Self { output: 0, weight: 0, others: background, background };
         let mut object = Object::default();
         let mut last = 0;
         let known = evidence.get(..known).unwrap_or(evidence);
@@ -46,21 +46,21 @@ impl Leading {
 
     /// Compares the leader so far with the next object.
     fn meet(&mut self, object: Object) {
-        if object.sum > self.own {
-            self.others = self.others.saturating_add(self.own);
-            (self.output, self.own) = (object.output, object.sum);
+        if object.sum > self.weight {
+            self.others = self.others.saturating_add(self.weight);
+            (self.output, self.weight) = (object.output, object.sum);
         } else {
             self.others = self.others.saturating_add(object.sum);
         }
     }
 
-    /// The weight of all other objects, the leader's being 1, rounded up; `None` where the background weighs more than the
+    /// The weight of all other objects relative to the leader's, rounded up; `None` if the background weighs more than the
     /// leader.
     ///
     /// Cost: a long division.
     pub(super) fn rivals(self) -> Option<Rivals> {
-        let own = NonZeroU64::new(self.own).filter(|own| self.background <= own.get())?;
-        Some(Rivals::from_q56(quotient(self.others, own)))
+        let weight = NonZeroU64::new(self.weight).filter(|weight| self.background <= weight.get())?;
+        Some(Rivals::from_q56(quotient(self.others, weight)))
     }
 }
 
@@ -85,25 +85,25 @@ fn quotient(mut part: u64, whole: NonZeroU64) -> u64 {
     (times << 56).saturating_add(down).saturating_add(u64::from(part != 0))
 }
 
-/// True if no object can be recognized, by one exponential: the strongest output that does not belong to the strongest one's
-/// object weighs more than `odds`, the loosest threshold, times the most outputs of an object.
+/// True if one exponential shows that no object can be recognized: the strongest output of any object but the strongest
+/// output's weighs more than `odds`, the loosest threshold, times the largest number of outputs of an object.
 pub(super) fn is_undecided(evidence: &[i64], known: usize, outputs: Outputs<'_>, odds: u64, unit: Unit) -> bool {
-    let (leader, most) = best(evidence);
+    let (leader, strongest) = best(evidence);
     let object = |output: usize| if output < known { outputs.object(output) } else { None };
-    let own = object(leader);
+    let leading_object = object(leader);
     let mut second = None;
     for (output, &evidence) in evidence.iter().enumerate() {
-        let is_other = object(output) != own || (own.is_none() && output != leader);
+        let is_other = object(output) != leading_object || (leading_object.is_none() && output != leader);
         if is_other && second.is_none_or(|second| evidence > second) {
             second = Some(evidence);
         }
     }
     let Some(second) = second else { return false };
     // Any leader's rivals weigh at least what the second output does, and its own outputs at most one each.
-    unit.weight(most.abs_diff(second)) > odds.saturating_mul(outputs.most().into())
+    unit.weight(strongest.abs_diff(second)) > odds.saturating_mul(outputs.most().into())
 }
 
-/// The posterior of the object that an output belongs to, and the part of it that is the output's.
+/// The posterior of the object that an output belongs to, and the output's part of it.
 ///
 /// Cost: an exponential for each output, and two long divisions.
 pub(super) fn posterior(
@@ -113,13 +113,13 @@ pub(super) fn posterior(
     outputs: Outputs<'_>,
     unit: Unit,
 ) -> (Posterior, Posterior) {
-    let (_, most) = best(evidence);
-    let (mut own, mut object, mut all) = (0_u64, 0_u64, 0_u64);
+    let (_, strongest) = best(evidence);
+    let (mut output_weight, mut object, mut all) = (0_u64, 0_u64, 0_u64);
     let number = |output: usize| if output < known { outputs.object(output) } else { None };
     for (other, &evidence) in evidence.iter().enumerate() {
-        let weight = unit.weight(most.abs_diff(evidence));
+        let weight = unit.weight(strongest.abs_diff(evidence));
         if other == output {
-            own = weight;
+            output_weight = weight;
         }
         if other == output || (number(other).is_some() && number(other) == number(output)) {
             object = object.saturating_add(weight);
@@ -127,10 +127,10 @@ pub(super) fn posterior(
         all = all.saturating_add(weight);
     }
     let part = |part: u64, whole: u64| if whole == 0 { 0 } else { ratio(part, whole) };
-    // Of the smaller one, so that 1 − 1e-16 is not 1.
+    // The smaller part is divided, so that 1 − 1e-16 is not 1.
     let rest = all - object;
     let posterior = if rest < object { ONE - part(rest, all) } else { part(object, all) };
-    (Posterior(posterior), Posterior(part(own, object)))
+    (Posterior(posterior), Posterior(part(output_weight, object)))
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! One switch: from bouncing edges to a settled level and the moment when it left the one before.
 
-use super::Settings;
+use super::EffectorSettings;
 
 /// A switch. All times are on the wrapping clock.
 #[derive(Clone, Copy, Debug)]
@@ -85,7 +85,7 @@ impl Debounce {
     }
 
     /// Microseconds from `now` until [`Debounce::fire`] has something to do, or `None`.
-    pub(super) fn due(&self, now: u32, settings: &Settings) -> Option<u32> {
+    pub(super) fn due(&self, now: u32, settings: &EffectorSettings) -> Option<u32> {
         let until = |from: u32, wait: u32| after(from.wrapping_add(wait), now);
         match self.left {
             Some(left) => {
@@ -98,7 +98,7 @@ impl Debounce {
     }
 
     /// Returns the change of the switch by `now`. Call it until it returns `None`.
-    pub(super) fn fire(&mut self, now: u32, settings: &Settings) -> Option<Change> {
+    pub(super) fn fire(&mut self, now: u32, settings: &EffectorSettings) -> Option<Change> {
         let Some(left) = self.left else {
             let stuck = self.settled && !self.stuck_told && after(now, self.closed_since) >= settings.stuck;
             self.stuck_told |= stuck;

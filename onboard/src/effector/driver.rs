@@ -1,7 +1,7 @@
 //! Edges in, touches and faults out.
 
 use super::debounce::{Change, Debounce, after};
-use super::{Edge, Fault, Finger, Settings};
+use super::{Edge, EffectorSettings, Fault, Finger};
 use palpate_shared::{ContactTime, Touch};
 
 /// State of the effector within a touch.
@@ -16,8 +16,8 @@ pub enum State {
     Complete,
     /// Time ran out before all three touched, or all opened again; some may still be closed.
     TimedOut,
-    /// The touch is over, and the fingers have to be open for [`Settings::rest`]. Also the state at power-up and after a
-    /// touch was dropped: then for [`Settings::release`], since the approach may still be going on.
+    /// The touch is over, and the fingers have to be open for [`EffectorSettings::rest`]. Also the state at power-up and after a
+    /// touch was dropped: then for [`EffectorSettings::release`], since the approach may still be going on.
     Released,
 }
 
@@ -36,7 +36,7 @@ const LATEST: u32 = 1 << 15;
 /// Cannot fail or panic with any edges.
 #[derive(Clone, Debug)]
 pub struct Effector {
-    settings: Settings,
+    settings: EffectorSettings,
     fingers: [Debounce; 3],
     /// First contacts of the touch in progress.
     contacts: [Option<u32>; 3],
@@ -92,7 +92,7 @@ impl Faults {
 
 impl Effector {
     /// A driver that takes its fingers for open; also in a static.
-    pub const fn new(settings: Settings) -> Self {
+    pub const fn new(settings: EffectorSettings) -> Self {
         Self {
             settings: settings.in_range(),
             fingers: [Debounce::new(); 3],
@@ -109,7 +109,7 @@ impl Effector {
     }
 
     /// Waits as these settings say from now on, also in a touch that is in progress.
-    pub fn set(&mut self, settings: Settings) {
+    pub fn set(&mut self, settings: EffectorSettings) {
         self.settings = settings.in_range();
     }
 
@@ -289,7 +289,7 @@ impl Effector {
 
     /// Time that all fingers have to be open before a touch can begin. In an approach they may be for up to `release`.
     const fn rest(&self) -> u32 {
-        let Settings { rest, release, .. } = self.settings;
+        let EffectorSettings { rest, release, .. } = self.settings;
         if self.unseen && release > rest { release } else { rest }
     }
 

@@ -10,13 +10,13 @@ use palpate_shared::link::{Event, FaultKind};
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Fault {
-    /// The finger has been closed for longer than [`Settings::stuck`](super::Settings::stuck). Reported once each time;
+    /// The finger has been closed for longer than [`EffectorSettings::stuck`](super::EffectorSettings::stuck). Reported once each time;
     /// no touch can begin before it opens.
     Stuck(Finger),
-    /// The finger opened and closed for longer than [`Settings::settle`](super::Settings::settle). The touch, if there
+    /// The finger opened and closed for longer than [`EffectorSettings::settle`](super::EffectorSettings::settle). The touch, if there
     /// was one, is dropped.
     Bouncing(Finger),
-    /// The finger was missing in [`Settings::silent_after`](super::Settings::silent_after) touches in a row.
+    /// The finger was missing in [`EffectorSettings::silent_after`](super::EffectorSettings::silent_after) touches in a row.
     Silent(Finger),
     /// The finger's pin cannot be read. Reported once, until it can be read again.
     Unreadable(Finger),

@@ -38,7 +38,7 @@ pub use interrupt::{Sensed, Watcher, drain};
 pub use pins::{Active, Fingers};
 pub use polled::Probe;
 pub use scale::{Geometry, Scale};
-pub use settings::Settings;
+pub use settings::EffectorSettings;
 
 /// A clock in microseconds that wraps from `u32::MAX` to 0 (every 71 minutes) and never stops. A counter of fewer bits has to
 /// be extended by its overflows: read as it is, each of them within a touch drops that touch with [`Fault::Clock`].

@@ -1,6 +1,6 @@
 //! Pins and a clock, read in a loop.
 
-use super::{Clock, Effector, Fault, Fingers, Settings, State};
+use super::{Clock, Effector, EffectorSettings, Fault, Fingers, State};
 use embedded_hal::digital::InputPin;
 use palpate_shared::Touch;
 
@@ -14,7 +14,7 @@ pub struct Probe<A, B, C, T> {
 
 impl<A: InputPin, B: InputPin, C: InputPin, T: Clock> Probe<A, B, C, T> {
     /// A probe of three pins and a clock.
-    pub fn new(fingers: Fingers<A, B, C>, clock: T, settings: Settings) -> Self {
+    pub fn new(fingers: Fingers<A, B, C>, clock: T, settings: EffectorSettings) -> Self {
         Self { fingers, clock, effector: Effector::new(settings) }
     }
 

@@ -8,14 +8,14 @@ const LONGEST: u32 = 1 << 30;
 
 /// Waiting times of the driver, in microseconds. Anything above 2³⁰ (18 minutes) counts as 2³⁰.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Settings {
+pub struct EffectorSettings {
     /// Time that a level must hold before the switch has settled: longer than the longest pause in its bouncing.
     pub debounce: u32,
     /// Time that a switch may take to settle before it counts as bouncing. More than `debounce`.
     pub settle: u32,
     /// After the first contact, fingers that have not touched within this time are missing. Longer than the largest
     /// time between contacts that the model was trained on, or full touches become partial ones; see
-    /// [`Settings::for_model`].
+    /// [`EffectorSettings::for_model`].
     pub timeout: u32,
     /// Time that all fingers must be open before a touch in progress ends without its missing contacts. Longer than a
     /// finger loses contact within one approach, and shorter than the way from one approach to the next takes. Also how
@@ -29,7 +29,7 @@ pub struct Settings {
     pub silent_after: u16,
 }
 
-impl Default for Settings {
+impl Default for EffectorSettings {
     /// For micro-switches (which bounce for 1 to 5 ms) and the paper's probe: 5 ms to debounce, 25 ms to settle, 1.2 s
     /// for the other fingers (of 200,000 simulated touches the contacts were up to 1.05 s apart), 100 ms release, 10 ms
     /// rest, 5 s until stuck, silent after 100 touches.
@@ -38,7 +38,7 @@ impl Default for Settings {
     }
 }
 
-impl Settings {
+impl EffectorSettings {
     /// The default, for a static.
     pub const DEFAULT: Self = Self {
         debounce: 5_000,

@@ -2,12 +2,12 @@ use super::*;
 use core::cell::Cell;
 use embedded_hal::digital::ErrorKind;
 use embedded_hal_mock::eh1::digital::{Mock, State as Level, Transaction};
-use palpate_shared::format::{HeaderBuilder, Trained, TrainedProbe, TrainedTouches, checksum};
+use palpate_shared::format::{HeaderBuilder, Section, Tag, TrainedProbe, TrainedTouches, checksum};
 use palpate_shared::{ContactTime, Touch};
 use proptest::prelude::*;
 use std::{rc::Rc, vec, vec::Vec};
 
-const SETTINGS: Settings = Settings {
+const SETTINGS: EffectorSettings = EffectorSettings {
     debounce: 5_000,
     settle: 25_000,
     timeout: 400_000,
@@ -30,12 +30,12 @@ struct Bench {
 }
 
 impl Bench {
-    fn new(settings: Settings) -> Self {
+    fn new(settings: EffectorSettings) -> Self {
         Self { effector: Effector::new(settings), outcomes: Outcomes::new() }
     }
 
     /// One whose fingers have been open for long enough since power-up, at this time.
-    fn rested(settings: Settings, at: u32) -> Self {
+    fn rested(settings: EffectorSettings, at: u32) -> Self {
         let mut bench = Self::new(settings);
         bench.poll(at.wrapping_sub(SETTINGS.release));
         bench.poll(at);
@@ -489,7 +489,7 @@ fn an_approach_that_goes_on_after_its_touch_was_dropped_is_no_other_touch() {
 }
 
 /// Touch that an effector makes of fingers at these times after the first contact.
-fn touched(settings: Settings, times: [u32; 3]) -> Outcomes {
+fn touched(settings: EffectorSettings, times: [u32; 3]) -> Outcomes {
     let mut bench = Bench::rested(settings, 50_000);
     Finger::ALL.into_iter().zip(times).for_each(|(finger, at)| bench.edges(&[(finger, true, 50_000 + at)]));
     bench.poll(100_000 + times[2]);
@@ -500,7 +500,7 @@ fn touched(settings: Settings, times: [u32; 3]) -> Outcomes {
 fn the_timeout_is_that_of_the_model_and_so_no_full_touch_becomes_a_partial_one() {
     let spread = 1_050_000;
     let touches = TrainedTouches { largest_spread: spread, ..TrainedTouches::full(false) };
-    let bytes = model_of(&Trained { touches: Some(touches), ..Trained::default() });
+    let bytes = model_of(None, Some(touches));
     let model = crate::Model::new(&bytes).unwrap();
     let half_speed = Scale::new(Geometry { spacing: 10, speed: 10 }, Geometry { spacing: 10, speed: 5 }).unwrap();
     for (scale, spread) in [(Scale::IDENTITY, spread), (half_speed, 2 * spread)] {
@@ -508,10 +508,10 @@ fn the_timeout_is_that_of_the_model_and_so_no_full_touch_becomes_a_partial_one()
         assert_eq!(touched(SETTINGS.for_model(&model, &scale), times), [Ok(Touch::from_micros(times))]);
         assert!(model.accepts(&scale.apply(&Touch::from_micros(times))).is_ok());
     }
-    let unstated = model_of(&Trained::default());
+    let unstated = model_of(None, None);
     let unstated = crate::Model::new(&unstated).unwrap();
     assert_eq!(SETTINGS.for_model(&unstated, &Scale::IDENTITY), SETTINGS);
-    assert!(Settings::default().timeout > spread, "longer than the paper's probe takes");
+    assert!(EffectorSettings::default().timeout > spread, "longer than the paper's probe takes");
 }
 
 #[test]
@@ -528,7 +528,7 @@ fn the_timeout_of_a_model_with_a_stroke_is_the_strokes_time_and_what_comes_later
         cone: 0,
         stroke_tolerance: None,
     };
-    let bytes = model_of(&Trained { touches: Some(touches), probe: Some(probe), ..Trained::default() });
+    let bytes = model_of(Some(probe), Some(touches));
     let model = crate::Model::new(&bytes).unwrap();
     for (last, expected) in [(stroke, Some(stroke)), (stroke + 1, None), (stroke + 9_000, None)] {
         let outcomes = touched(SETTINGS.for_model(&model, &Scale::IDENTITY), [0, 70_000, last]);
@@ -546,10 +546,19 @@ fn the_timeout_of_a_model_with_a_stroke_is_the_strokes_time_and_what_comes_later
     }
 }
 
-/// A model without a tree.
-fn model_of(trained: &Trained) -> Vec<u8> {
+/// A model without a tree that states this probe and these touches.
+fn model_of(probe: Option<TrainedProbe>, touches: Option<TrainedTouches>) -> Vec<u8> {
     let mut sections = Vec::new();
-    trained.write(|bytes| sections.extend_from_slice(bytes));
+    let mut put = |tag: Tag, must_understand: bool, content: &[u8]| {
+        let section = Section { tag: tag.code(), must_understand, content };
+        section.write(&mut |bytes| sections.extend_from_slice(bytes));
+    };
+    if let Some(probe) = probe {
+        put(Tag::Probe, false, &probe.to_bytes()[..probe.length()]);
+    }
+    if let Some(touches) = touches {
+        put(Tag::Touches, true, &touches.to_bytes());
+    }
     let length = 96 + 4 + sections.len() + 4 + 4 + 4;
     let header = HeaderBuilder::default()
         .with_descriptor(1)
@@ -588,7 +597,7 @@ fn each_poll_reads_each_pin_once_and_active_low_switches_close_to_low() {
     };
     let [first, middle, last] = [20, 21, 23].map(|contact| Mock::new(&levels(contact)));
     let clock = TestClock::default();
-    let settings = Settings { release: 10_000, ..SETTINGS };
+    let settings = EffectorSettings { release: 10_000, ..SETTINGS };
     let mut probe = Probe::new(Fingers::new(first, middle, last, Active::Low), clock.clone(), settings);
     let mut touches = Vec::new();
     for i in 0..30 {
@@ -676,7 +685,7 @@ fn an_edge_that_is_a_little_older_than_the_last_poll_counts_as_now() {
 
 #[test]
 fn settings_out_of_range_are_brought_into_it() {
-    let settings = Settings {
+    let settings = EffectorSettings {
         debounce: u32::MAX,
         settle: 0,
         timeout: u32::MAX,

@@ -2,9 +2,7 @@
 
 use super::*;
 use crate::{CapacityError, Familiarity, ModelError, Stopping, Verdict};
-use palpate_shared::format::{
-    HEADER_LENGTH, HeaderBuilder, Length, MAPS_LAYOUT, Tag, TrainedProbe, checksum, write_section,
-};
+use palpate_shared::format::{HEADER_LENGTH, HeaderBuilder, Length, MAPS_LAYOUT, Section, Tag, TrainedProbe, checksum};
 use palpate_shared::{ContactTime, Pose as HandPose, Position, Touch};
 use proptest::prelude::*;
 use std::sync::LazyLock;
@@ -125,9 +123,11 @@ pub(crate) fn model(placed: &[Placed], least: i16) -> Vec<u8> {
         stroke_tolerance: None,
     };
     let mut sections = Vec::new();
-    let mut put = |bytes: &[u8]| sections.extend(bytes);
-    write_section(Tag::Probe, false, &probe.to_bytes()[..probe.length()], &mut put);
-    write_section(Tag::Maps, true, &content, &mut put);
+    let probe = probe.to_bytes()[..probe.length()].to_vec();
+    for (tag, must_understand, content) in [(Tag::Probe, false, &probe), (Tag::Maps, true, &content)] {
+        let section = Section { tag: tag.code(), must_understand, content };
+        section.write(&mut |bytes| sections.extend(bytes));
+    }
     let header = HeaderBuilder::default()
         .with_layout(MAPS_LAYOUT)
         .with_last_object(last)

@@ -112,7 +112,7 @@ impl Model<'_> {
     }
 }
 
-/// The value that the library predicts where its raw score is `margin`: through the [`inverse_link`], divided by
+/// The value that the library predicts where its raw score is `margin`: through the inverse link, divided by
 /// [`Prediction::average`] before.
 ///
 /// Cost: that of the link, and a division where margins are averaged. Cannot fail.

@@ -47,5 +47,6 @@ pub use record::RECORD_LENGTH;
 pub use serve::{ERRORS_IN_A_ROW, serve, serve_with};
 pub use session::Station;
 pub use storage::{Loaded, NoStorage, NotStored, Place, Storage};
+pub use table::Locates;
 #[cfg(feature = "locate")]
 pub use table::Table;

@@ -3,7 +3,7 @@
 use super::session::{PROGRAM, Station};
 use super::storage::{NoStorage, Storage};
 use crate::Model;
-use crate::effector::{Effector, Fault, Scale, Sensed, Settings, State, drain};
+use crate::effector::{Effector, EffectorSettings, Fault, Scale, Sensed, State, drain};
 use core::fmt;
 use palpate_shared::link::{Decision, Device, DeviceEnd, Event, Refusal, TouchMessage, VerdictMessage};
 use palpate_shared::{ContactTime, Pose, Touch};
@@ -104,12 +104,12 @@ impl Course {
 /// Settings of a [`ProbeStation`].
 #[derive(Clone, Copy, Debug)]
 pub struct ProbeSettings {
-    /// Waiting times of the effector; the timeout is the model's, see [`Settings::for_model`].
-    pub effector: Settings,
+    /// Waiting times of the effector; the timeout is the model's, see [`EffectorSettings::for_model`].
+    pub effector: EffectorSettings,
     /// From the probe that is there to the one that the model was trained for.
     pub scale: Scale,
     /// A pose that was announced longer before the first contact, in microseconds, does not count; nor does one announced
-    /// more than [`Settings::release`] after it, which is that of the next approach.
+    /// more than [`EffectorSettings::release`] after it, which is that of the next approach.
     pub pose_lasts: u32,
     /// True if verdicts carry the numbers needed to compare them with another recognizer's: 12 bytes, and a posterior.
     pub detail: bool,
@@ -122,7 +122,7 @@ pub struct ProbeSettings {
 impl Default for ProbeSettings {
     /// The model's own probe; poses last two seconds.
     fn default() -> Self {
-        let effector = Settings::default();
+        let effector = EffectorSettings::default();
         Self { effector, scale: Scale::IDENTITY, pose_lasts: 2_000_000, detail: true, boot: 0, program: PROGRAM }
     }
 }

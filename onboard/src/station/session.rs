@@ -124,7 +124,7 @@ impl<'m, const N: usize, S: Storage, L: Locates> Station<'m, N, S, L> {
         });
     }
 
-    /// Sets the name and version of the chip's program on the link; [`PROGRAM`] by default.
+    /// Sets the name and version of the chip's program on the link, by default those of this crate.
     pub(crate) const fn set_program(&mut self, program: &'static str) {
         self.program = program;
     }

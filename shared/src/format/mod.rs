@@ -33,8 +33,8 @@ pub use records::{Axis, Columns, Group};
 pub use sequences::{Fault, Guard, Limits, Position};
 pub use strangers::{MisfitTerms, MisfitTest, ObjectMisfit, Strangers};
 pub use trained::{
-    Feature, Fingerprints, MUST_UNDERSTAND, PatternShares, SECTION_HEADER_LENGTH, Section, Tag, Trained, TrainedNoise,
-    TrainedProbe, TrainedTouches, take_feature, take_section, write_section,
+    Feature, Fingerprints, MUST_UNDERSTAND, PatternShares, SECTION_HEADER_LENGTH, Section, Tag, TrainedNoise,
+    TrainedProbe, TrainedTouches, take_feature, take_section,
 };
 
 /// Bytes of the checksum at the end.

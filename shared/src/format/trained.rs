@@ -294,67 +294,20 @@ pub fn take_feature<'a>(bytes: &mut &'a [u8]) -> Option<Feature<'a>> {
     Some(Feature { scale: f32::from_le_bytes([a, b, c, d]), name })
 }
 
-/// Everything that a model states about its training, to be written into it.
+/// An optional section of a model.
 ///
 /// ```
-/// use palpate_shared::Patterns;
-/// use palpate_shared::format::{Counted, HeaderBuilder, Trained, TrainedTouches};
+/// use palpate_shared::format::{HeaderBuilder, Section, Tag, TrainedTouches};
 ///
-/// let touches = TrainedTouches {
-///     patterns: Patterns::CONTACTS,
-///     counted: Counted::Contacts,
-///     needs_pose: false,
-///     largest_spread: 1_050_000,
-/// };
-/// let trained = Trained { touches: Some(touches), ..Trained::default() };
+/// let content = TrainedTouches::full(false).to_bytes();
 /// let mut sections = Vec::new();
-/// trained.write(|bytes| sections.extend_from_slice(bytes));
+/// // A reader that does not know the tag would take other touches for evidence.
+/// let section = Section { tag: Tag::Touches.code(), must_understand: true, content: &content };
+/// section.write(&mut |bytes| sections.extend_from_slice(bytes));
 /// let header = HeaderBuilder::default().with_optional_length(sections.len() as u32);
 /// // Header, text, these sections, base margins, and so on.
 /// # assert_eq!(sections.len(), 16);
 /// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Trained {
-    /// The probe.
-    pub probe: Option<TrainedProbe>,
-    /// The touches.
-    pub touches: Option<TrainedTouches>,
-    /// The noise.
-    pub noise: Option<TrainedNoise>,
-    /// The shares of the contact patterns.
-    pub shares: Option<PatternShares>,
-}
-
-impl Trained {
-    /// Hands the bytes of all sections to `put`, in order. Sections with higher tags can follow with
-    /// [`write_section`].
-    pub fn write(&self, mut put: impl FnMut(&[u8])) {
-        if let Some(probe) = self.probe {
-            let bytes = probe.to_bytes();
-            write_section(Tag::Probe, false, bytes.get(..probe.length()).unwrap_or(&bytes), &mut put);
-        }
-        if let Some(touches) = self.touches {
-            // A reader that does not know it would take other touches for evidence.
-            write_section(Tag::Touches, true, &touches.to_bytes(), &mut put);
-        }
-        if let Some(noise) = self.noise {
-            write_section(Tag::Noise, false, &noise.to_bytes(), &mut put);
-        }
-        if let Some(shares) = self.shares {
-            write_section(Tag::PatternShares, false, &shares.to_bytes(), &mut put);
-        }
-    }
-}
-
-/// Hands the bytes of one section to `put`: its header, its content, and zeros up to a multiple of four. Sections have to
-/// be written in the order of their tags, each once.
-///
-/// A content of 4 GB or more is cut there.
-pub fn write_section(tag: Tag, must_understand: bool, content: &[u8], put: &mut impl FnMut(&[u8])) {
-    Section { tag: tag.code(), must_understand, content }.write(put);
-}
-
-/// A section as it is found in a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Section<'a> {
     /// The tag without [`MUST_UNDERSTAND`].
@@ -366,7 +319,10 @@ pub struct Section<'a> {
 }
 
 impl Section<'_> {
-    /// Hands its bytes to `put`, as [`write_section`].
+    /// Hands its bytes to `put`: its header, its content, and zeros up to a multiple of four. Sections have to be written in the
+    /// order of their tags, each once.
+    ///
+    /// A content of 4 GB or more is cut there.
     pub fn write(&self, put: &mut impl FnMut(&[u8])) {
         let tag = self.tag | if self.must_understand { MUST_UNDERSTAND } else { 0 };
         let length = u32::try_from(self.content.len()).unwrap_or(u32::MAX);
@@ -418,12 +374,18 @@ mod tests {
 
     #[test]
     fn sections_are_read_back_as_written() {
-        let trained = Trained { probe: Some(PROBE), touches: Some(TOUCHES), noise: Some(NOISE), shares: None };
         let shares = PatternShares([9, 8, 7, 6, 5, 65_530]);
+        let contents: [(Tag, bool, &[u8]); 5] = [
+            (Tag::Probe, false, &PROBE.to_bytes()[..PROBE.length()]),
+            (Tag::Touches, true, &TOUCHES.to_bytes()),
+            (Tag::Noise, false, &NOISE.to_bytes()),
+            (Tag::FeatureNames, false, b"seven b"),
+            (Tag::PatternShares, false, &shares.to_bytes()),
+        ];
         let bytes = written(|put| {
-            trained.write(&mut *put);
-            write_section(Tag::FeatureNames, false, b"seven b", put);
-            Trained { shares: Some(shares), ..Trained::default() }.write(put);
+            for (tag, must_understand, content) in contents {
+                Section { tag: tag.code(), must_understand, content }.write(&mut *put);
+            }
         });
         let mut rest = bytes.as_slice();
         let sections: Vec<Section> = core::iter::from_fn(|| take_section(&mut rest)).collect();

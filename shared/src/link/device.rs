@@ -97,7 +97,7 @@ pub trait Device {
         Err(Refusal::Unsupported)
     }
 
-    /// Name and version of the chip's program: at most [`TEXT`] bytes of it are sent.
+    /// Name and version of the chip's program: at most 128 bytes of it are sent.
     fn program(&self) -> &str {
         ""
     }

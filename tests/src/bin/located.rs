@@ -8,7 +8,7 @@
 
 use palpate::calibrate;
 use palpate::locate::{
-    self, Aimed, Approach, Effort, Hand, Maps, Real, Settings, Shape, Standing, Surface, Truth, Until, World,
+    self, Aimed, Approach, CastSettings, Effort, Hand, Maps, Real, Shape, Standing, Surface, Truth, Until, World,
 };
 use palpate::mesh::Object;
 use palpate::probe::approach::Probe;
@@ -106,7 +106,7 @@ fn real(given: &Given) -> Real {
 fn learned(given: &Given, known: &[Standing], touched: &Dataset, probe: &Probe) -> Result<Vec<u8>, Box<dyn Error>> {
     let (number, real) = (|key: &str, default: f64| given.number(key, default), real(given));
     let settings = with!(
-        Settings::default(),
+        CastSettings::default(),
         fine = number("cell", 1.0) < 1.5,
         noise = number("stated", real.height),
         position = number("stated_position", real.position),

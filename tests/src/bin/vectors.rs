@@ -9,12 +9,12 @@ use palpate::ensemble::Node;
 use palpate::with;
 use palpate_onboard::{Model, Recognizer, Refused, RowsSeen, Stopping, Verdict, exp2_negative};
 use palpate_shared::format::{
-    Counted, Limits, Outputs, PatternShares, Position, Sentinel, Trained, TrainedTouches, checksum, f32_key,
+    Counted, Limits, Outputs, PatternShares, Position, Sentinel, TrainedTouches, checksum, f32_key,
 };
 use palpate_shared::{ContactTime, Descriptor, MISSING_FEATURE, Patterns, Pose, Touch};
 use palpate_tests::abuse::{self, changed, section};
 use palpate_tests::random::{self, Shape};
-use palpate_tests::sections::{trained, with_sections};
+use palpate_tests::sections::{Trained, trained, with_sections};
 use palpate_tests::vectors::{hex, numbers, refusal, touch_words};
 use palpate_tests::wide::widened;
 use rand::rngs::SmallRng;

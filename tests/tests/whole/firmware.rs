@@ -12,7 +12,7 @@ use palpate::probe::approach::Probe;
 use palpate::touches::{Dataset, ObjectTouches, Source};
 use palpate::with;
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
-use palpate_shared::format::{Counted, Trained, TrainedTouches};
+use palpate_shared::format::{Counted, TrainedTouches};
 use palpate_shared::link::{
     Answer, Decision, Decoder, Detail, Event, FRAME_MAX, FaultKind, Frame, HostSettings, Message, Request,
     TouchMessage, VerdictMessage, encode,
@@ -22,7 +22,7 @@ use palpate_tests::bad_line::{Faults, relay};
 use palpate_tests::chips::{M0, M4F, build, cargo};
 use palpate_tests::pins::{APPROACH, Edges, edges};
 use palpate_tests::random::{self, Shape};
-use palpate_tests::sections::trained;
+use palpate_tests::sections::{Trained, trained};
 use palpate_tests::{HOUSEHOLD, ROOT};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
@@ -152,7 +152,7 @@ fn touches_with_a_position_give_the_hosts_verdicts_places_and_approaches_over_a_
     let probe = with!(Probe::default(), radius = 1.5, spacing = 15.0, speed = 100.0, tilt = 0.0, stroke = Some(20.0));
     let mut objects = builtin::make(&["bowl", "camera", "mouse"], None).unwrap();
     objects.iter_mut().for_each(|object| object.millimeters = Some(4.0));
-    let settings = with!(locate::Settings::default(), fine = false);
+    let settings = with!(locate::CastSettings::default(), fine = false);
     let standing = locate::standing(&objects.iter().collect::<Vec<_>>(), &probe, settings.noise, &()).unwrap();
     let surfaces = locate::cast(&standing, &probe, &settings).unwrap();
     let names: Vec<String> = standing.iter().map(|object| object.name.clone()).collect();

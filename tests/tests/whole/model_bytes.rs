@@ -3,10 +3,10 @@
 use palpate::compile::{Layout, Leaf, Settings, compile};
 use palpate_onboard::{Batch, Model, ModelError, Recognizer, RowsSeen, Stopping};
 use palpate_shared::Descriptor;
-use palpate_shared::format::{HEADER_LENGTH, MUST_UNDERSTAND, PatternShares, Trained, TrainedTouches};
+use palpate_shared::format::{HEADER_LENGTH, MUST_UNDERSTAND, PatternShares, TrainedTouches};
 use palpate_tests::abuse::{self, cuts, places, sealed, section};
 use palpate_tests::random::{self, Shape};
-use palpate_tests::sections::{trained, with_sections};
+use palpate_tests::sections::{Trained, trained, with_sections};
 use palpate_tests::wide::widened;
 use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};

@@ -3,12 +3,12 @@
 use embedded_io::{ErrorKind, ErrorType, Read, Write};
 use palpate::compile::{Leaf, Settings, compile};
 use palpate_onboard::station::{ERRORS_IN_A_ROW, Memory, NoStorage, RECORD_LENGTH, serve};
-use palpate_shared::format::{Counted, Trained, TrainedTouches};
+use palpate_shared::format::{Counted, TrainedTouches};
 use palpate_shared::link::{FRAME_MAX, Frame, LinkError, Message, Refusal, Request, encode};
 use palpate_shared::{ContactTime, Patterns, Pose, Touch};
 use palpate_tests::desk::{Desk, OBJECTS, PowerCut, Step, expected, load, push};
 use palpate_tests::random::{self, Shape};
-use palpate_tests::sections::trained;
+use palpate_tests::sections::{Trained, trained};
 use rand::{Rng, RngExt};
 
 /// Most touches count; those without any contact, and those that spread too far, do not.

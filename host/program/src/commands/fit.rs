@@ -6,7 +6,7 @@ use super::probe::{SizeArguments, refuse_unstated};
 use super::progress::Bar;
 use super::scene::SceneArguments;
 use palpate::ensemble::StatedProbe;
-use palpate::fit::{Fit, GrazingEstimate, Settings, between, fit, offset, offset_between};
+use palpate::fit::{Fit, FitSettings, GrazingEstimate, between, fit, offset, offset_between};
 use palpate::output;
 use palpate::results::{Results, Value};
 use palpate::touches::{Origin, read_touches};
@@ -42,7 +42,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "FILE")]
     plate: Option<PathBuf>,
     /// Approaches to each object; simulated
-    #[arg(long, value_name = "N", value_parser = count, default_value_t = Settings::default().approaches)]
+    #[arg(long, value_name = "N", value_parser = count, default_value_t = FitSettings::default().approaches)]
     approaches: u64,
     #[command(flatten)]
     size: SizeArguments,
@@ -76,7 +76,7 @@ pub(crate) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     let mut objects = arguments.size.objects(&arguments.sources, global.seed())?;
     arguments.scene.weights.weigh(&mut objects)?;
     let plate = arguments.plate.as_deref().map(read_touches).transpose()?;
-    let settings = with!(Settings::default(), origin, approaches = arguments.approaches, seed = global.seed());
+    let settings = with!(FitSettings::default(), origin, approaches = arguments.approaches, seed = global.seed());
     let found = fit(&recorded, &objects, plate.as_deref(), &settings, &Bar::new())?;
     output::write_bytes(&arguments.output, found.toml().as_bytes())?;
     global.print_about(&arguments.output, &found, || table(&found))?;

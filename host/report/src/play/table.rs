@@ -42,7 +42,7 @@ pub fn table(objects: &[Object], settings: &Settings, progress: &dyn Progress) -
     };
     let shown: Vec<Object> = surfaces.iter().zip(&objects).map(own).collect();
     let real = Real::of(&settings.noise, origin.probe.speed)?;
-    let maps = with!(locate::Settings::default(), fine = false).expecting(&real);
+    let maps = with!(locate::CastSettings::default(), fine = false).expecting(&real);
     let standing = locate::standing(&shown.iter().collect::<Vec<_>>(), &origin.probe, maps.noise, progress)?;
     let cast = locate::cast(&standing, &origin.probe, &maps)?;
     let names: Vec<String> = standing.iter().map(|object| object.name.clone()).collect();
@@ -87,7 +87,7 @@ pub fn table(objects: &[Object], settings: &Settings, progress: &dyn Progress) -
 fn body(
     surfaces: &[super::Surface],
     origin: &Origin,
-    maps: &locate::Settings,
+    maps: &locate::CastSettings,
     bytes: usize,
     cast: usize,
     command: &str,

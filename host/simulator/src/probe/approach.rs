@@ -120,7 +120,7 @@ impl Aim {
         }
     }
 
-    /// The one with this [`name`](Self::name).
+    /// The aim with this name.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|aim| aim.name() == name)
     }

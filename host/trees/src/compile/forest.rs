@@ -80,9 +80,16 @@ impl<'a> Forest<'a> {
                 Output::One(object) => return Err(place(faults::object(object, objects))),
                 Output::Each => objects,
             };
-            let own = |node| ensemble.threshold(index, node);
-            let mut reader =
-                Reader { tree, own: &own, values, features, thresholds, left: tree.nodes.len(), largest: 0.0 };
+            let exact_threshold = |node| ensemble.threshold(index, node);
+            let mut reader = Reader {
+                tree,
+                exact_threshold: &exact_threshold,
+                values,
+                features,
+                thresholds,
+                left: tree.nodes.len(),
+                largest: 0.0,
+            };
             let (root, splits) = reader.branch(0, 0).map_err(place)?;
             trees.push(Arc::new(Branches { root, output: tree.output, splits, largest: reader.largest }));
         }
@@ -163,7 +170,7 @@ impl Branches<'_> {
     /// True if the tree adds to an object's margin.
     pub(super) fn values_for(&self, object: usize) -> bool {
         match self.output {
-            Output::One(own) => own == object,
+            Output::One(output) => output == object,
             Output::Each => true,
         }
     }
@@ -180,7 +187,7 @@ impl Branches<'_> {
 struct Reader<'a, 'r> {
     tree: &'a Tree,
     /// The threshold of a node as the file has it.
-    own: &'r dyn Fn(usize) -> Option<Threshold>,
+    exact_threshold: &'r dyn Fn(usize) -> Option<Threshold>,
     values: usize,
     features: usize,
     thresholds: Thresholds<'a>,
@@ -218,10 +225,10 @@ impl<'a> Reader<'a, '_> {
                 }
                 let (left, left_splits) = self.branch(left, depth + 1)?;
                 let (right, right_splits) = self.branch(right, depth + 1)?;
-                let own = (self.own)(index).unwrap_or(Threshold::below(f64::from(threshold)));
-                let split = match self.thresholds.cut(feature, threshold, own) {
+                let exact = (self.exact_threshold)(index).unwrap_or(Threshold::below(f64::from(threshold)));
+                let split = match self.thresholds.cut(feature, threshold, exact) {
                     Some(cut) => Split { feature: number, cut, missing_left, left, right, left_splits },
-                    // Every number goes left: with sides changed, none is below the least one.
+                    // Every number goes left: with the sides exchanged, no number is below the smallest one.
                     None => Split {
                         feature: number,
                         cut: -i32::MAX,

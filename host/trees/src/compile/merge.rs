@@ -12,25 +12,25 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// The most thresholds of a merged tree: then it is no deeper than a complete tree may be.
+/// Largest number of thresholds of a merged tree, which is then no deeper than a complete tree may be.
 const MAX_CUTS: usize = 255;
 
-/// A forest with the same sums, of fewer trees where there are such.
+/// A forest whose sums are those of another one that may have more trees.
 pub(super) struct Merged<'a> {
     pub(super) forest: Forest<'a>,
     pub(super) scale: Scale,
     /// Base margins: in units, or f32 bits.
     pub(super) base: Vec<i32>,
-    /// For each tree, what it stands for.
+    /// For each tree, the trees of the ensemble that it replaces.
     pub(super) sources: Vec<Source>,
 }
 
-/// Trees of an ensemble that a tree of a model stands for.
+/// The trees of an ensemble that one tree of a model replaces.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Source {
     /// Their numbers.
     pub(crate) trees: Vec<usize>,
-    /// Amount that the model's tree adds less than they do, in units times 2^shift of its leaves; the base has it.
+    /// Amount by which they add more than the model's tree, in units times 2^shift of its leaves; the base includes it.
     pub(crate) offset: i32,
 }
 
@@ -43,15 +43,15 @@ struct Stump<'f> {
     right: i64,
 }
 
-/// Sums of stumps: between one threshold and the next.
+/// Sums of stumps over one feature, constant from each threshold to the next.
 struct Steps {
     cuts: Vec<i32>,
     values: Vec<i64>,
 }
 
-/// Equal sums from as few trees as possible.
+/// Replaces trees by fewer ones with the same sums.
 pub(super) fn merge<'a>(forest: &Forest<'a>, leaf: LeafType, scale: &Scale) -> Merged<'a> {
-    let most = match leaf {
+    let largest_leaf = match leaf {
         LeafType::I8 => 127,
         LeafType::I16 => 32767,
         LeafType::F32 => {
@@ -59,7 +59,7 @@ pub(super) fn merge<'a>(forest: &Forest<'a>, leaf: LeafType, scale: &Scale) -> M
                 forest: Forest { trees: forest.trees.clone(), ..*forest },
                 scale: scale.clone(),
                 base: forest.base.iter().map(|base| base.to_bits().cast_signed()).collect(),
-                sources: (0..forest.trees.len()).map(Source::of).collect(),
+                sources: (0..forest.trees.len()).map(Source::tree).collect(),
             };
         }
     };
@@ -83,20 +83,20 @@ pub(super) fn merge<'a>(forest: &Forest<'a>, leaf: LeafType, scale: &Scale) -> M
                     let key = (object, split.feature, split.missing_left, shift);
                     stumps.entry(key).or_default().push(Stump { tree: index, split, left, right });
                 }
-                _ => _ = kept.insert(index, (Source::of(index), tree.clone(), shift)),
+                _ => _ = kept.insert(index, (Source::tree(index), tree.clone(), shift)),
             },
-            (Branch::Split(_), Output::Each) => _ = kept.insert(index, (Source::of(index), tree.clone(), shift)),
+            (Branch::Split(_), Output::Each) => _ = kept.insert(index, (Source::tree(index), tree.clone(), shift)),
         }
     }
     for ((object, feature, missing_left, shift), stumps) in stumps {
-        for group in groups(&stumps, most) {
+        for group in groups(&stumps, largest_leaf) {
             let first = group[0].tree;
             if group.len() == 1 {
-                kept.insert(first, (Source::of(first), forest.trees[first].clone(), shift));
+                kept.insert(first, (Source::tree(first), forest.trees[first].clone(), shift));
                 continue;
             }
             let steps = Steps::of(group);
-            let offset = steps.offset(most);
+            let offset = steps.offset(largest_leaf);
             base[object] += (offset as i32) << shift;
             let value = |sum: i64| ((sum - offset) as f64 * f64::from(scale.unit) * f64::from(1_u32 << shift)) as f32;
             let values: Vec<f32> = steps.values.iter().map(|&sum| value(sum)).collect();
@@ -120,19 +120,19 @@ pub(super) fn merge<'a>(forest: &Forest<'a>, leaf: LeafType, scale: &Scale) -> M
 }
 
 impl Source {
-    /// A tree that stands for itself.
-    fn of(tree: usize) -> Self {
+    /// The source of a tree that is kept as it is.
+    fn tree(tree: usize) -> Self {
         Self { trees: vec![tree], offset: 0 }
     }
 }
 
-/// Stumps in their order, parted where the sums of one tree would not fit its leaves.
-fn groups<'s, 'f>(mut stumps: &'s [Stump<'f>], most: i64) -> Vec<&'s [Stump<'f>]> {
+/// Divides stumps, in their order, into groups: the sums of each fit the leaves of one tree.
+fn groups<'s, 'f>(mut stumps: &'s [Stump<'f>], largest_leaf: i64) -> Vec<&'s [Stump<'f>]> {
     let mut groups = Vec::new();
     while !stumps.is_empty() {
-        // As many as fit: whether one more does is not certain to be the last time that one does not.
+        // Stops at the first stump that does not fit, although more of them together might fit again.
         let mut count = 1;
-        while count < stumps.len() && Steps::of(&stumps[..count + 1]).fits(most) {
+        while count < stumps.len() && Steps::of(&stumps[..count + 1]).fits(largest_leaf) {
             count += 1;
         }
         let (group, rest) = stumps.split_at(count);
@@ -160,23 +160,23 @@ impl Steps {
 
     fn range(&self) -> (i64, i64) {
         let first = self.values[0];
-        self.values.iter().fold((first, first), |(least, most), &value| (least.min(value), most.max(value)))
+        self.values.iter().fold((first, first), |(low, high), &value| (low.min(value), high.max(value)))
     }
 
-    fn fits(&self, most: i64) -> bool {
-        let (least, largest) = self.range();
-        // With a threshold at least, since no tree without one is among these.
-        (1..=MAX_CUTS).contains(&self.cuts.len()) && largest - least <= 2 * most
+    fn fits(&self, largest_leaf: i64) -> bool {
+        let (low, high) = self.range();
+        // A merged tree has a threshold: trees without one are in the base.
+        (1..=MAX_CUTS).contains(&self.cuts.len()) && high - low <= 2 * largest_leaf
     }
 
-    /// Amount that leaves have to have less to fit.
-    fn offset(&self, most: i64) -> i64 {
-        let (least, largest) = self.range();
-        if least < -most || largest > most { (least + largest).div_euclid(2) } else { 0 }
+    /// Amount to subtract from all values so that leaves hold them; 0 if they do already.
+    fn offset(&self, largest_leaf: i64) -> i64 {
+        let (low, high) = self.range();
+        if low < -largest_leaf || high > largest_leaf { (low + high).div_euclid(2) } else { 0 }
     }
 }
 
-/// A tree that is as shallow as can be.
+/// Makes the shallowest tree with these thresholds and values.
 fn balanced<'a>(cuts: &[i32], values: &[f32], feature: u8, missing_left: bool, object: usize) -> Branches<'a> {
     fn branch<'a>(cuts: &[i32], values: &[f32], feature: u8, missing_left: bool) -> Branch<'a> {
         let middle = cuts.len() / 2;
@@ -278,7 +278,7 @@ mod tests {
         assert!(all.into_iter().eq(splits), "every tree with a split is in one place");
         // With leaves as the trainer left them nothing is added up beforehand.
         let kept = super::merge(&forest, Leaf::F32, &scale).sources;
-        assert!(kept.into_iter().eq((0..300).map(super::Source::of)));
+        assert!(kept.into_iter().eq((0..300).map(super::Source::tree)));
     }
 
     #[test]

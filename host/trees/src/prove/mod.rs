@@ -1,8 +1,8 @@
 //! Proofs that a compiled model means what its ensemble means, for every row: any key of every feature, missing,
 //! infinite, negative zero and subnormal values among them.
 //!
-//! The model is read by a reader of its own, written from the format's description alone. Each of its trees is walked
-//! together with the trees of the ensemble that it stands for, over boxes of rows, until each box reaches one leaf of each:
+//! The proof has its own reader of models, written from the format's description alone. Each tree of the model is followed
+//! together with the trees of the ensemble that it replaces, over boxes of rows, until each box reaches one leaf of each:
 //! the leaves must be equal, or one apart by the rounding of the leaf. That takes time in proportion to the leaves. What the
 //! trees' worst leaves add up to bounds the error and the range of each margin. One row of each box also goes through the
 //! chip's own code, whose margins must be those of the leaves.
@@ -47,9 +47,9 @@ pub struct Proof {
     pub stated: f64,
     /// For each output its name, and bounds of its margin.
     pub ranges: Vec<(String, f64, f64)>,
-    /// The most splits that a row passes: the sum of each tree's longest way.
+    /// Largest number of splits that a row passes: the sum of the depths of all trees.
     pub splits: usize,
-    /// The most instructions of a row, estimated: see [`Instructions`].
+    /// Estimate of the largest number of instructions for a row: see [`Instructions`].
     pub estimated: Instructions,
     /// The links of the model and of the ensemble, if `export --link` set another one: the proof is about margins.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -67,7 +67,7 @@ struct Found {
 struct Matched {
     /// The largest difference of a leaf.
     error: f64,
-    /// The ensemble's trees that it stands for.
+    /// The ensemble's trees that it replaces.
     sources: Vec<usize>,
 }
 
@@ -102,11 +102,12 @@ pub fn prove(bytes: &[u8], ensemble: &Ensemble) -> Result<Proof> {
 
 /// The leaf of a model's tree that a row reaches.
 pub(crate) struct Reached {
-    /// Trees of the ensemble that it should stand for.
+    /// Trees of the ensemble that the model's tree should replace.
     pub(crate) source: Source,
     /// Size of a step of its leaves.
     pub(crate) step: f64,
-    pub(crate) own: Vec<f64>,
+    /// Values of the leaf.
+    pub(crate) values: Vec<f64>,
     /// Values that the trees of the ensemble add.
     pub(crate) expected: Vec<f64>,
 }
@@ -129,17 +130,17 @@ pub(crate) fn leaves_at(
     let numbers = Numbers::new(&plain, ensemble);
     let mut row: Vec<Values> = row.iter().map(|key| plain.values(*key)).collect();
     let mut leaf = |(source, (tree, step)): (Source, &(Tree, f64))| {
-        let mut own = Vec::new();
+        let mut values = Vec::new();
         tree.leaves(&mut row, &mut |leaf, _| {
-            own = leaf.to_vec();
+            values = leaf.to_vec();
             Ok::<(), Error>(())
         })?;
-        let mut expected = vec![-f64::from(source.offset) * step; own.len()];
+        let mut expected = vec![-f64::from(source.offset) * step; values.len()];
         for &tree in &source.trees {
-            let values = numbers.leaf(tree, node(tree));
-            expected.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+            let leaf = numbers.leaf(tree, node(tree));
+            expected.iter_mut().zip(leaf).for_each(|(sum, value)| *sum += value);
         }
-        Ok(Reached { source, step: *step, own, expected })
+        Ok(Reached { source, step: *step, values, expected })
     };
     order.into_iter().zip(&plain.trees).map(&mut leaf).collect()
 }
@@ -199,10 +200,10 @@ impl Subject<'_> {
     fn proof(self, found: &Found) -> Proof {
         let Self { plain, ensemble, .. } = self;
         let largest = found.trees.iter().map(|tree| tree.error).fold(0.0, f64::max);
-        let range = |(output, (name, &[_, least, most])): (usize, (&String, &[f64; 3]))| {
+        let range = |(output, (name, &[_, low, high])): (usize, (&String, &[f64; 3]))| {
             let [scale, offset] = plain.scales.get(output).copied().unwrap_or([plain.scale, 0.0]);
-            let [least, most] = [least, most].map(|end| end * (scale / plain.scale) + offset);
-            (name.clone(), least, most)
+            let [low, high] = [low, high].map(|end| end * (scale / plain.scale) + offset);
+            (name.clone(), low, high)
         };
         Proof {
             trees: found.trees.len(),
@@ -243,14 +244,15 @@ impl Subject<'_> {
 
     /// Returns an error unless the chip's margins of a row are the sums of the leaves that were read.
     fn agrees(&self, row: &[i32]) -> Result<()> {
-        let own = self.margins(row);
-        for (object, (own, read)) in own.into_iter().zip(self.plain.margins(row)).enumerate() {
-            let is_same = if self.plain.most > 0.0 { (own - read).abs() < 0.25 * self.plain.unit } else { own == read };
+        let chip_margins = self.margins(row);
+        for (object, (chip, read)) in chip_margins.into_iter().zip(self.plain.margins(row)).enumerate() {
+            let is_same =
+                if self.plain.most > 0.0 { (chip - read).abs() < 0.25 * self.plain.unit } else { chip == read };
             if !is_same {
                 let output = &self.ensemble.objects[object];
                 let rows: Vec<Values> = row.iter().map(|key| self.plain.values(*key)).collect();
                 return Err(problem!(
-                    "the chip's code gives {own:e} for {output} where the model's leaves add up to {read:e}: {}",
+                    "the chip's code gives {chip:e} for {output} where the model's leaves add up to {read:e}: {}",
                     self.example(&rows)
                 )
                 .fix(OTHER_FILE));
@@ -261,9 +263,9 @@ impl Subject<'_> {
 
     /// The links of the model and of the ensemble, if they differ.
     fn other_link(self) -> Option<[&'static str; 2]> {
-        let own = self.ensemble.prediction().link;
-        let link = Link::from_code(self.plain.link.0).filter(|link| *link != own)?;
-        Some([link.name(), own.name()])
+        let of_ensemble = self.ensemble.prediction().link;
+        let link = Link::from_code(self.plain.link.0).filter(|link| *link != of_ensemble)?;
+        Some([link.name(), of_ensemble.name()])
     }
 
     /// Rows in words: the features that are bound.
@@ -312,9 +314,9 @@ fn statements(plain: &Plain, ensemble: &Ensemble) -> Result<()> {
         sorted.sort_unstable();
         sorted
     };
-    let [own, theirs] = [&plain.names, &ensemble.objects];
-    if own.len() != theirs.len() || (own != theirs && sorted(own) == sorted(theirs)) {
-        same("outputs", own.join(", "), theirs.join(", "))?;
+    let [model, expected] = [&plain.names, &ensemble.objects];
+    if model.len() != expected.len() || (model != expected && sorted(model) == sorted(expected)) {
+        same("outputs", model.join(", "), expected.join(", "))?;
     }
     same("features", plain.features.to_string(), ensemble.inputs.count().to_string())?;
     let descriptor = ensemble.schema().map_or(255, |schema| schema.code);
@@ -324,14 +326,14 @@ fn statements(plain: &Plain, ensemble: &Ensemble) -> Result<()> {
     {
         same("names of features", plain.feature_names.join(", "), names.join(", "))?;
     }
-    let own = ensemble.prediction();
+    let prediction = ensemble.prediction();
     let rule = |last: bool, average: u32| {
         format!("the {} of equal classes, values of a margin over {average}", if last { "last" } else { "first" })
     };
     let (_, last, average) = plain.link;
-    same("predictions", rule(last, average), rule(own.last_of_ties, own.average))?;
+    same("predictions", rule(last, average), rule(prediction.last_of_ties, prediction.average))?;
     let kind = |targets| if targets { "targets" } else { "classes, or one value" };
-    same("kinds of outputs", kind(plain.targets).into(), kind(own.targets).into())?;
+    same("kinds of outputs", kind(plain.targets).into(), kind(prediction.targets).into())?;
     let missing = ensemble.origin.imported.as_ref().and_then(|imported| imported.sentinel);
     let number = |end: f32| match &plain.keys {
         Keys::Scaled(scales) => (f64::from(end) * f64::from(scales[0])).round() as i32,

@@ -15,7 +15,7 @@ pub(super) fn first_different_tree(
 ) -> Option<usize> {
     let encoded = reference.encoder.row(row);
     let reached = leaves_at(model, ensemble, &encoded, |tree| reference.leaf_node(tree, row, &encoded)).ok()?;
-    let different = reached.iter().filter_map(|Reached { source, step, own, expected }| {
+    let different = reached.iter().filter_map(|Reached { source, step, values: own, expected }| {
         // Half a step for each tree, or nothing with f32 leaves.
         let slack = 0.501 * step * source.trees.len() as f64;
         let differs = own.iter().zip(expected).any(|(own, expected)| (own - expected).abs() > slack);

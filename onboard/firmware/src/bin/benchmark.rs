@@ -8,7 +8,7 @@ use core::hint::black_box;
 use cortex_m_rt::entry;
 use palpate_firmware::meter::{self, Meter};
 use palpate_firmware::{exit, fail, println, sections::Sections};
-use palpate_onboard::effector::{Edge, Effector, Finger, Geometry, Scale, Settings};
+use palpate_onboard::effector::{Edge, Effector, EffectorSettings, Finger, Geometry, Scale};
 use palpate_onboard::station::{NoStorage, Station, serve};
 use palpate_onboard::{Model, Recognizer, Stopping};
 use palpate_shared::link::{
@@ -52,7 +52,7 @@ fn main() -> ! {
 }
 
 fn effector(meter: &mut Meter, touch: &Touch) {
-    let mut effector = Effector::new(Settings::default());
+    let mut effector = Effector::new(EffectorSettings::default());
     let mut now = 0_u32;
     let mut poll = |effector: &mut Effector| {
         now = now.wrapping_add(1_000);

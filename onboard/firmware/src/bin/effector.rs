@@ -7,7 +7,7 @@ use core::convert::Infallible;
 use core::hint::black_box;
 use cortex_m_rt::entry;
 use embedded_hal::digital::{ErrorType, InputPin};
-use palpate_onboard::effector::{Active, Clock, Effector, Fingers, Scale, Settings, Watcher, drain};
+use palpate_onboard::effector::{Active, Clock, Effector, EffectorSettings, Fingers, Scale, Watcher, drain};
 use palpate_onboard::{Model, Recognizer, Stopping, Verdict};
 
 #[path = "../no_panic.rs"]
@@ -40,7 +40,7 @@ impl Clock for Anything {
 fn main() -> ! {
     let bytes: &'static [u8] = black_box(&[]);
     if let Ok(model) = &Model::new(bytes) {
-        let mut effector = Effector::new(Settings::default().for_model(model, &Scale::IDENTITY));
+        let mut effector = Effector::new(EffectorSettings::default().for_model(model, &Scale::IDENTITY));
         let fingers = Fingers::new(Anything, Anything, Anything, Active::Low);
         let mut watcher = Watcher::<_, _, _, 64>::start(fingers, &Anything);
         if let Ok(recognizer) = &mut Recognizer::<10>::new(model, Stopping::from_model(model)) {

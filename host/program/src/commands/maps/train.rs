@@ -8,7 +8,7 @@ use crate::commands::probe::{SizeArguments, refuse_unstated};
 use crate::commands::progress::{Bar, cancel_when_interrupted};
 use crate::commands::real::RealArguments;
 use crate::commands::teach::RecordedArguments;
-use palpate::locate::{self, Maps, Real, Settings, Standing, Surface};
+use palpate::locate::{self, CastSettings, Maps, Real, Standing, Surface};
 use palpate::output;
 use palpate::probe::noise::Noise;
 use palpate::probe::noise::quantity::{ANGLE, LENGTH, SHARE};
@@ -113,7 +113,7 @@ impl MapSettings {
     }
 
     /// The settings that are given, and `base` where they are open.
-    fn over(&self, base: Settings) -> Settings {
+    fn over(&self, base: CastSettings) -> CastSettings {
         let or = |given: Option<f64>, own: f64| given.map_or(own, |micrometers| micrometers / 1e3);
         with!(
             base.clone(),
@@ -180,7 +180,7 @@ pub(super) fn run(arguments: Arguments, global: &Global) -> Result<()> {
     size.probe.of_dataset(file.as_ref(), &dataset)?;
     let probe = locate::probe_of(&dataset).map_err(taught)?;
     let noise = real.on_table(size.probe.noise(file.as_ref(), &dataset, Noise::default())?)?;
-    let settings = maps.unwrap_or_default().over(Settings::default().expecting(&Real::of(&noise, probe.speed)?));
+    let settings = maps.unwrap_or_default().over(CastSettings::default().expecting(&Real::of(&noise, probe.speed)?));
     settings.check().map_err(|error| match error.kind() {
         palpate::error::Kind::Setting { name, value, allowed } => {
             Error::setting("maps", format!("{name}={value}"), allowed.clone())
@@ -278,7 +278,7 @@ mod tests {
 
     #[test]
     fn settings_that_are_given_replace_those_of_the_noise() {
-        let set = |text: &str| text.parse::<MapSettings>().unwrap().over(with!(Settings::default(), lost = 0.05));
+        let set = |text: &str| text.parse::<MapSettings>().unwrap().over(with!(CastSettings::default(), lost = 0.05));
         let all = set("cell=2mm,range=20mm,noise=1mm,lost=1%,position=500um,drift=1mm/2deg");
         assert_eq!((all.fine, all.range, all.noise, all.lost), (false, 20.0, 1.0, 0.01));
         assert_eq!((all.position, all.drift, all.drift_yaw), (0.5, 1.0, 2.0));

@@ -1,4 +1,4 @@
-//! The parts of a mesh: which of its triangles hang together, and what can be said of each.
+//! The connected parts of a mesh, and whether each is closed and right side out.
 
 use crate::mesh::Mesh;
 use glam::{DVec3, Vec3};
@@ -34,10 +34,9 @@ impl Part {
     }
 }
 
-/// Largest number of tests of rays against triangles that distinguish cavities from parts that are inside out: a second
-/// or so. A mesh with so many parts that this does not suffice is said to be right side out where the boxes of parts
-/// allow it.
-const MOST_TRIES: usize = 100_000_000;
+/// Largest number of tests of rays against triangles that distinguish cavities from parts that are inside out, which take
+/// about a second. Beyond it, a part that faces inward counts as a cavity of each part whose box encloses its own.
+const MAX_TESTS: usize = 100_000_000;
 
 /// Number of vertices of a part that must be inside another part for it to be a cavity.
 const SAMPLES: usize = 64;
@@ -53,8 +52,8 @@ pub(super) fn parts(mesh: &Mesh) -> (Vec<Part>, usize) {
     edges.sort_unstable();
     let mut sets = Sets::new(triangles.len());
     for uses in edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
-        if let [one, other] = uses {
-            sets.join(one.2, other.2);
+        if let [first, second] = uses {
+            sets.join(first.2, second.2);
         }
     }
     let (numbers, count) = sets.numbers();
@@ -84,19 +83,19 @@ pub(super) fn parts(mesh: &Mesh) -> (Vec<Part>, usize) {
     let mut branching_edges = 0;
     for uses in edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
         match uses {
-            [one] => {
-                let part = &mut parts[numbers[one.2 as usize]];
+            [only] => {
+                let part = &mut parts[numbers[only.2 as usize]];
                 part.open_edges += 1;
                 part.is_closed = false;
             }
-            [one, other] if one.3 == other.3 => parts[numbers[one.2 as usize]].contrary_edges += 1,
+            [first, second] if first.3 == second.3 => parts[numbers[first.2 as usize]].contrary_edges += 1,
             [_, _] => {}
             uses => {
                 branching_edges += 1;
-                let of = |number: usize| uses.iter().filter(|other| numbers[other.2 as usize] == number).count();
+                let uses_by = |part: usize| uses.iter().filter(|edge| numbers[edge.2 as usize] == part).count();
                 // Three to a few: a part goes on across the edge if it has two of its triangles there.
-                for number in uses.iter().take(16).map(|one| numbers[one.2 as usize]) {
-                    parts[number].is_closed &= of(number) % 2 == 0;
+                for part in uses.iter().take(16).map(|edge| numbers[edge.2 as usize]) {
+                    parts[part].is_closed &= uses_by(part) % 2 == 0;
                 }
             }
         }
@@ -106,27 +105,27 @@ pub(super) fn parts(mesh: &Mesh) -> (Vec<Part>, usize) {
     (parts, branching_edges)
 }
 
-/// Marks the parts that are inside out. A part that faces inward inside of another is a cavity of it, as it should be.
+/// Marks the parts that are inside out. A part that faces inward and lies inside another one is a cavity of it.
 fn find_inside_out(parts: &mut [Part], numbers: &[usize], mesh: &Mesh) {
     let solid = |sign: f64| -> Vec<usize> {
         (0..parts.len()).filter(|&number| parts[number].is_solid() && sign * parts[number].volume > 0.0).collect()
     };
     let (inward, outward) = (solid(-1.0), solid(1.0));
-    let mut tries = MOST_TRIES;
+    let mut tests_left = MAX_TESTS;
     for number in inward {
-        let Some(left) = tries.checked_sub(outward.len()) else { return };
-        tries = left;
-        let own = &parts[number];
-        let around = |other: &Part| other.low.cmple(own.low).all() && own.high.cmple(other.high).all();
-        let candidates: Vec<usize> = outward.iter().copied().filter(|&other| around(&parts[other])).collect();
+        let Some(left) = tests_left.checked_sub(outward.len()) else { return };
+        tests_left = left;
+        let part = &parts[number];
+        let encloses = |other: &Part| other.low.cmple(part.low).all() && part.high.cmple(other.high).all();
+        let candidates: Vec<usize> = outward.iter().copied().filter(|&other| encloses(&parts[other])).collect();
         let samples = if candidates.is_empty() { Vec::new() } else { samples(number, numbers, mesh) };
         let is_cavity = candidates.into_iter().any(|other| {
             let cost = samples.len() * mesh.triangles.len();
-            if cost > tries {
-                // Too many to look at: the box decides.
+            if cost > tests_left {
+                // Too many tests: the box decides.
                 return true;
             }
-            tries -= cost;
+            tests_left -= cost;
             samples.iter().all(|&sample| is_inside(sample, other, numbers, mesh))
         });
         parts[number].is_inside_out = !is_cavity;
@@ -135,18 +134,18 @@ fn find_inside_out(parts: &mut [Part], numbers: &[usize], mesh: &Mesh) {
 
 /// Some vertices of a part, evenly spread over its triangles.
 fn samples(number: usize, numbers: &[usize], mesh: &Mesh) -> Vec<DVec3> {
-    let own: Vec<&[u32; 3]> =
-        mesh.triangles.iter().zip(numbers).filter(|(_, own)| **own == number).map(|(triangle, _)| triangle).collect();
-    let step = own.len().div_ceil(SAMPLES).max(1);
-    own.into_iter().step_by(step).map(|&[a, ..]| Vec3::from(mesh.vertices[a as usize]).as_dvec3()).collect()
+    let of_part = mesh.triangles.iter().zip(numbers).filter(|(_, part)| **part == number);
+    let triangles: Vec<&[u32; 3]> = of_part.map(|(triangle, _)| triangle).collect();
+    let step = triangles.len().div_ceil(SAMPLES).max(1);
+    triangles.into_iter().step_by(step).map(|&[a, ..]| Vec3::from(mesh.vertices[a as usize]).as_dvec3()).collect()
 }
 
 /// True if a point is inside a closed part: a ray leaves it more often than it enters it.
 fn is_inside(point: DVec3, part: usize, numbers: &[usize], mesh: &Mesh) -> bool {
-    // A direction in which nobody models.
+    // A direction that no edge of a modeled object is likely to have.
     let direction = DVec3::new(0.836_516_303_737_8, 0.482_962_913_144_5, 0.258_819_045_102_5);
     let mut crossings = 0;
-    for (triangle, _) in mesh.triangles.iter().zip(numbers).filter(|(_, own)| **own == part) {
+    for (triangle, _) in mesh.triangles.iter().zip(numbers).filter(|(_, number)| **number == part) {
         let [a, b, c] = triangle.map(|i| Vec3::from(mesh.vertices[i as usize]).as_dvec3() - point);
         // The ray passes the triangle if it has all edges on one side.
         let sides = [a.cross(b), b.cross(c), c.cross(a)].map(|normal| normal.dot(direction));
@@ -160,7 +159,7 @@ fn is_inside(point: DVec3, part: usize, numbers: &[usize], mesh: &Mesh) -> bool 
     crossings > 0
 }
 
-/// Sets of triangles that hang together.
+/// Sets of connected triangles: each refers to another one of its set, the first to itself.
 pub(super) struct Sets(Vec<u32>);
 
 impl Sets {
@@ -168,22 +167,24 @@ impl Sets {
         Self((0..count as u32).collect())
     }
 
-    fn first(&mut self, mut of: u32) -> u32 {
-        while self.0[of as usize] != of {
-            let above = self.0[of as usize];
-            self.0[of as usize] = self.0[above as usize];
-            of = above;
+    /// The first triangle of a triangle's set.
+    fn first(&mut self, mut triangle: u32) -> u32 {
+        while self.0[triangle as usize] != triangle {
+            let parent = self.0[triangle as usize];
+            self.0[triangle as usize] = self.0[parent as usize];
+            triangle = parent;
         }
-        of
+        triangle
     }
 
-    pub(super) fn join(&mut self, one: u32, other: u32) {
-        let (one, other) = (self.first(one), self.first(other));
-        // To the lower one, so that numbers follow the order of the triangles.
-        self.0[one.max(other) as usize] = one.min(other);
+    /// Unites the sets of two triangles.
+    pub(super) fn join(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.first(a), self.first(b));
+        // The lower one stays first, so that numbers follow the order of the triangles.
+        self.0[a.max(b) as usize] = a.min(b);
     }
 
-    /// The number of each one's set, and how many sets there are.
+    /// For each triangle the number of its set, and the number of sets.
     pub(super) fn numbers(mut self) -> (Vec<usize>, usize) {
         let mut numbers = vec![0; self.0.len()];
         let mut count = 0;
