@@ -239,7 +239,7 @@ fn plain(model: &Model<'_>, stopping: Stopping) -> Plain {
     }
 }
 
-/// Weights of rivals up to which the chip does not tell them apart.
+/// Weights and probabilities up to which the chip does not tell them apart.
 const RESOLUTION: f64 = 1e-14;
 /// The share of a weight, as a logarithm, by which the chip's exponential and its temperature may be off.
 const ARITHMETIC: f64 = 1e-3;
@@ -257,7 +257,10 @@ fn check_decision<const N: usize>(model: &Model<'_>, chip: &Recognizer<'_, N>, p
     let temperature = model.temperature().value();
     let posterior = chip.posterior_together(output).0;
     let rivals = plain.rivals(output, temperature);
-    let is_off = beyond(posterior.complement() / posterior.to_f64(), rivals).abs() > rounded / temperature + ARITHMETIC;
+    let expected = 1.0 / (1.0 + rivals);
+    let against = if rivals > 1.0 { 1.0 - expected } else { rivals * expected };
+    let off = beyond(posterior.complement(), posterior.to_f64()) - beyond(against, expected);
+    let is_off = off.abs() > rounded / temperature + ARITHMETIC;
     let above = beyond(plain.rivals(output, 1.0), plain.thresholds[output]);
     // A test of strangers holds names back, and plain numbers have none.
     let has_test = model.strangers().is_some_and(|strangers| strangers.test.is_some());
@@ -266,7 +269,7 @@ fn check_decision<const N: usize>(model: &Model<'_>, chip: &Recognizer<'_, N>, p
         None => above < -rounded - ARITHMETIC && !has_test,
     };
     if is_off || is_odd {
-        Err(wrong_decision(model, output, plain.steps, [posterior.to_f64(), 1.0 / (1.0 + rivals)]))
+        Err(wrong_decision(model, output, plain.steps, [posterior.to_f64(), expected]))
     } else {
         Ok(())
     }
@@ -333,6 +336,18 @@ mod tests {
             let more = ((f64::from(model.margin_error()) * 2.0 + 0.01) / f64::from(model.unit())) as i32;
             compiled[1] += more;
             assert!(error(both(&compiled)).contains("a plain sum of the ensemble's margins"));
+        }
+    }
+
+    #[test]
+    fn the_chips_decisions_follow_from_plain_sums_of_the_ensembles_margins() {
+        let ensemble = ensemble();
+        let bytes = compile(&ensemble, &compile::Settings::default()).unwrap().bytes;
+        let model = compile::open(&bytes).unwrap();
+        // Few touches go down the trees one by one, many together.
+        for count in [5, 100] {
+            let found = parity(&ensemble, &model, &synthetic::dataset(&[count; 3], 1), 200, 1, &()).unwrap();
+            assert_eq!((found.verdict_differs, found.touches_differ), (0, 0), "{found:?}");
         }
     }
 
