@@ -63,7 +63,7 @@ fn a_recording_trains_and_is_recognized_like_any_other_data_set() {
         stdout(record(at, &lines, &format!("--object {name} -o recorded")));
     }
     succeeds(at, "train recorded -o model.json --trees rounds=3,depth=2");
-    says(at, "evaluate model.json recorded", &["\nall     100.0 % 100.0 %"]);
+    says(at, "evaluate model.json recorded", &["\nall      100.0 %  100.0 %"]);
     succeeds(at, "export model.json -o model.palpate");
     let verdicts = says(at, "recognize model.palpate recorded/mug.txt", &["mug"]);
     assert!(!verdicts.contains("bowl"), "{verdicts}");

@@ -91,7 +91,7 @@ fn a_model_that_counts_rows_gives_the_verdicts_of_the_ensemble_with_the_numbers_
         fails(at, "recognize counted unseen.csv --features", 1, "no column is named number");
         let inspected = figures(at, "inspect counted");
         assert_eq!((&inspected["position"], inspected.get("guard")), (&json!("number"), None));
-        says(at, "inspect counted", &["row number     number, which recognizers count\n"]);
+        says(at, "inspect counted", &["row number      number, which recognizers count\n"]);
         assert!(!succeeds(at, "inspect by-hand").contains("row number"));
     }
 }
@@ -117,7 +117,7 @@ fn a_guard_names_the_sensor_that_is_stuck_missing_or_out_of_its_range() {
     assert!((-6.0..-1.0).contains(&low) && (2.0..7.0).contains(&high), "{height}");
     let text = succeeds(at, "inspect sure");
     let line = format!(
-        "guard          1 of 2 features have limits\n{:15}height: {} to {}, never missing, the same in at most 2 rows\n",
+        "guard           1 of 2 features have limits\n{:16}height: {} to {}, never missing, the same in at most 2 rows\n",
         "", low as f32, high as f32
     );
     assert!(text.contains(&line), "{text}");
