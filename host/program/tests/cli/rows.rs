@@ -206,7 +206,7 @@ fn what_the_library_predicts_is_compared_too() {
 fn a_model_with_names_or_another_link_of_its_own_is_proved() {
     let at = &three_classes("xgboost-3.4-softprob.ubj");
     let prove = "verify model.palpate source.ubj --prove";
-    assert!(says(at, prove, &["\njug "]).starts_with("Proved: on every possible row"));
+    assert!(says(at, prove, &["\njug  "]).starts_with("Proved: on every possible row"));
     // The same names in another order are other classes.
     succeeds(at, "export source.ubj -o model.palpate --names 2,1,0");
     fails(at, prove, 1, "the model's outputs are not the ensemble's: 2, 1, 0, and not 0, 1, 2");
