@@ -247,7 +247,7 @@ const ARITHMETIC: f64 = 1e-3;
 /// Refuses a posterior or a verdict of the chip's code that is farther from that in plain numbers than rounded margins explain.
 fn check_decision<const N: usize>(model: &Model<'_>, chip: &Recognizer<'_, N>, plain: &Plain) -> Result<()> {
     let beyond = |weight: f64, other: f64| ((weight + RESOLUTION) / (other + RESOLUTION)).ln();
-    // The margins of two outputs are off by as much with every touch.
+    // Each touch may put both of two margins off by the error that the model states.
     let rounded = 2.0 * f64::from(plain.steps) * f64::from(model.margin_error());
     let named = match chip.verdict() {
         Verdict::Recognized { object, .. } => Some(usize::from(object)),

@@ -26,7 +26,7 @@ impl Drawer<'_> {
         steps.shuffle(&mut self.random(number));
     }
 
-    /// So many of all steps, each once.
+    /// A number of steps out of all, none twice.
     pub(crate) fn some(self, number: u64, all: usize, count: usize) -> impl Iterator<Item = usize> + use<> {
         rand::seq::index::sample(&mut self.random(number), all, count).into_iter()
     }
