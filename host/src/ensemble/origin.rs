@@ -126,31 +126,31 @@ impl TouchOrigin {
         compile::Stated { spacing: probe.spacing as f32, speed: probe.speed as f32, sections }
     }
 
-    /// For each of an ensemble's outputs the number of its object, and its share of it; none if each is an object.
+    /// For each output of an ensemble the number of its object, and its share of the object; none if each output is an object.
     pub(crate) fn outputs(&self, names: &[String]) -> Option<Vec<(u8, f64)>> {
         if self.placements.is_empty() {
             return None;
         }
         let (mut before, mut number) = (None, 0_u8);
-        let of = |name: &String| {
+        let output = |name: &String| {
             let object = object_of(name);
             number = number.saturating_add(u8::from(before.as_deref().is_some_and(|before| before != object)));
             before = Some(object.to_owned());
             (number, self.placements.get(name).copied().unwrap_or(1.0))
         };
-        Some(names.iter().map(of).collect())
+        Some(names.iter().map(output).collect())
     }
 
     /// The content of the section that says which touches they were, for a model of these objects; none where nothing is known.
     fn section(&self, objects: &[String]) -> Option<Vec<u8>> {
-        let of = |name: &String| self.touches.get(name).map_or(0, |&fingerprint| short(fingerprint));
-        let stated: Vec<u16> = objects.iter().map(of).collect();
-        let is_known = stated.iter().any(|&object| object != 0);
-        is_known.then(|| stated.into_iter().flat_map(u16::to_le_bytes).collect())
+        let fingerprint = |name: &String| self.touches.get(name).map_or(0, |&fingerprint| short(fingerprint));
+        let fingerprints: Vec<u16> = objects.iter().map(fingerprint).collect();
+        let is_known = fingerprints.iter().any(|&fingerprint| fingerprint != 0);
+        is_known.then(|| fingerprints.into_iter().flat_map(u16::to_le_bytes).collect())
     }
 }
 
-/// The object that an output belongs to, by its name: what stands before the last slash.
+/// The object of an output: the part of the output's name before the last slash.
 pub(crate) fn object_of(output: &str) -> &str {
     output.rsplit_once('/').map_or(output, |(object, _)| object)
 }
@@ -205,31 +205,31 @@ impl StatedProbe {
     /// # Errors
     /// If radius, spacing, nominal speed, stroke, scale or scene differ. Tilt and travel are not compared: they are how
     /// approaches were drawn.
-    pub fn compare(names: [&str; 2], [one, other]: [TrainedProbe; 2]) -> Result<()> {
+    pub fn compare(names: [&str; 2], [first, second]: [TrainedProbe; 2]) -> Result<()> {
         let differs = |a: f32, b: f32| (a - b).abs() > 1e-5 * a.abs().max(b.abs());
         let mut differences = Vec::new();
-        if one.length != other.length {
-            differences.push(format!("unit {:?} and {:?}", one.length.name(), other.length.name()));
+        if first.length != second.length {
+            differences.push(format!("unit {:?} and {:?}", first.length.name(), second.length.name()));
         }
         let numbers = [
-            ("radius", one.radius, other.radius),
-            ("spacing", one.spacing, other.spacing),
-            ("speed", one.speed, other.speed),
+            ("radius", first.radius, second.radius),
+            ("spacing", first.spacing, second.spacing),
+            ("speed", first.speed, second.speed),
         ];
-        let different = numbers.into_iter().filter(|(_, one, other)| differs(*one, *other));
-        differences.extend(different.map(|(name, one, other)| format!("{name} {one} and {other}")));
-        let strokes = [one.stroke, other.stroke];
+        let different = numbers.into_iter().filter(|(_, first, second)| differs(*first, *second));
+        differences.extend(different.map(|(name, first, second)| format!("{name} {first} and {second}")));
+        let strokes = [first.stroke, second.stroke];
         let is_same = match strokes {
-            [Some(one), Some(other)] => !differs(one, other),
+            [Some(first), Some(second)] => !differs(first, second),
             _ => strokes == [None; 2],
         };
         if !is_same {
-            let [one, other] = strokes.map(|stroke| stroke.map_or("none".into(), |stroke| stroke.to_string()));
-            differences.push(format!("stroke {one} and {other}"));
+            let [first, second] = strokes.map(|stroke| stroke.map_or("none".into(), |stroke| stroke.to_string()));
+            differences.push(format!("stroke {first} and {second}"));
         }
-        if one.cone != other.cone {
-            let [one, other] = [one.cone, other.cone].map(scene);
-            differences.push(format!("scene {one} and {other}"));
+        if first.cone != second.cone {
+            let [first, second] = [first.cone, second.cone].map(scene);
+            differences.push(format!("scene {first} and {second}"));
         }
         if differences.is_empty() {
             return Ok(());
@@ -257,22 +257,22 @@ impl StatedProbe {
     /// Errors of [`compare`](Self::compare); recorded touches that show another stroke, with both strokes; and times that are
     /// not in seconds.
     pub fn compare_with(names: [&str; 2], probe: Option<TrainedProbe>, longest: u32, dataset: &Dataset) -> Result<()> {
-        let own = Self::of(dataset).map(|own| own.trained());
-        let is_simulated = own.is_some() && !dataset.is_recorded();
-        if let Some((probe, own)) = probe.zip(own) {
-            // Nor do recordings state a scene.
-            let unstated = |own: TrainedProbe| TrainedProbe {
-                stroke: own.stroke.or(probe.stroke),
-                cone: if own.cone == 0 { probe.cone } else { own.cone },
-                ..own
+        let stated = Self::of(dataset).map(|stated| stated.trained());
+        let is_simulated = stated.is_some() && !dataset.is_recorded();
+        if let Some((probe, stated)) = probe.zip(stated) {
+            // Recordings may state neither a stroke nor a scene.
+            let completed = TrainedProbe {
+                stroke: stated.stroke.or(probe.stroke),
+                cone: if stated.cone == 0 { probe.cone } else { stated.cone },
+                ..stated
             };
-            Self::compare(names, [probe, if is_simulated { own } else { unstated(own) }])?;
+            Self::compare(names, [probe, if is_simulated { stated } else { completed }])?;
         }
         if is_simulated {
             return Ok(());
         }
-        // Without a largest time that is known, millimeters are of no known scale. What states no probe is of the published one.
-        let published = || own.is_none().then(|| Self::default().trained());
+        // Millimeters have no known scale unless the largest time is known. A data set that states no probe is of the published one.
+        let published = || stated.is_none().then(|| Self::default().trained());
         let of_ten_units =
             |probe: &TrainedProbe| (10.0 * 3.0_f64.sqrt() + 2.0 * f64::from(probe.spacing)) / f64::from(probe.speed);
         if let Some(probe) =

@@ -35,7 +35,7 @@ pub struct Terms {
     pub real: Real,
     /// Make a test for unknown objects: no object is named before the eighth touch then.
     pub unknown: bool,
-    /// Go on until the pose of the named object is as sure; the promise is of the name.
+    /// Go on until the pose of the named object is this sure; the promise is about the name.
     pub until: Option<Until>,
     /// Weight of the pose where approaches are chosen, in 64ths.
     pub pose: u16,
@@ -94,7 +94,7 @@ pub struct Calibrated {
     pub strangers: Option<LeftOut>,
 }
 
-/// Results of a test for unknown objects, on objects that the model is not to know: each of its own is left out in turn.
+/// Results of a test for unknown objects: each object of the model is left out in turn, and then is one that it does not know.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct LeftOut {
     /// Sequences.
@@ -246,12 +246,15 @@ pub fn calibrate(
     let followed = follow(plain_maps, standing, probe, &before, strictest(terms), progress)?;
     let units: Vec<usize> = (0..followed.len()).collect();
     let Begin { starts, .. } = Begin::new(&followed, &units, terms.sequences, &terms.promise, strictest(terms));
-    // Where a test is to decide, sequences are as long as it takes.
-    let least = if terms.unknown { TESTED } else { 1 };
+    // A sequence is at least long enough for the test to decide.
+    let min_touches = if terms.unknown { TESTED } else { 1 };
     let goes_on = terms.unknown || terms.until.is_some();
     let odds = odds_of(if terms.unknown { strictest(terms) } else { terms.promise.margin() });
-    let each =
-        if goes_on { play(plain_maps, standing, probe, &before, (odds, least, false), progress)? } else { Vec::new() };
+    let each = if goes_on {
+        play(plain_maps, standing, probe, &before, (odds, min_touches, false), progress)?
+    } else {
+        Vec::new()
+    };
     ToPlace::of(&each, terms)?;
     let least_fits = if terms.unknown { least_fits(&each, maps.objects()) } else { Vec::new() };
     let stated = Restated { least_fits, stretch: terms.until.map_or(0, |_| stretch(&each)), ..plain };
@@ -311,7 +314,7 @@ pub fn calibrate_recorded(
     let (plain_maps, names) = (opened(&bytes)?, super::names(&maps));
     // Recorded touches have noise of their own.
     let terms = &Terms { aimed: Aimed::Random, real: Real::like(&Noise::default(), probe.speed), ..*terms };
-    let of = |(index, (touches, pool)): (u64, (&ObjectTouches, &Pool))| -> Result<Vec<Sequence>> {
+    let sequences_of = |(index, (touches, pool)): (u64, (&ObjectTouches, &Pool))| -> Result<Vec<Sequence>> {
         progress::advance(progress, 1)?;
         let is_down = |touch| match super::seen(&hand, touch) {
             Err(error) if error.is(&Kind::NotDown) => Ok(None),
@@ -332,7 +335,7 @@ pub fn calibrate_recorded(
     let pools: Vec<_> = (0..).zip(recorded.objects.iter().flat_map(pools)).collect();
     let count = pools.len();
     progress.begin("recordings", Some(count as u64));
-    let sequences = pools.into_par_iter().map(of).collect::<Result<Vec<_>>>()?.concat();
+    let sequences = pools.into_par_iter().map(sequences_of).collect::<Result<Vec<_>>>()?.concat();
     let rate = terms.promise.rate;
     let way = Way { starts: &[strictest(terms)], loosest: None };
     let chosen = promise(&[], &sequences, names.len(), &way, &terms.promise).map_err(|stop| match stop {
@@ -384,33 +387,33 @@ fn promised(
     })
 }
 
-/// The strictest margin that is tried, in nats: more than the promise's own, unless searches are not as fine. They end when cells
-/// that are not fine weigh e^-6 of all.
+/// The strictest margin that is tried, in nats: 4 more than the promise's, but at most 6 unless the promise needs more, since a search
+/// ends when coarse cells weigh e^-6 of all.
 fn strictest(terms: &Terms) -> f64 {
-    let own = terms.promise.margin();
-    own.max((own + 4.0).min(6.0))
+    let margin = terms.promise.margin();
+    margin.max((margin + 4.0).min(6.0))
 }
 
-/// Share of known objects that may be called unknown.
-const ALARMS: f64 = 0.01;
+/// Share of sequences of known objects that may end as unknown.
+const ALARM_RATE: f64 = 0.01;
 
 fn opened(bytes: &[u8]) -> Result<Maps<'_>> {
     Maps::new(bytes).map_err(refused)
 }
 
-/// Limit of the fit for each object: while it leads, all but a share of its own sequences stay above it from the touch on at which a
-/// test decides.
+/// The lowest fit of each object with which it counts as known: from the first touch of the test on, while the object leads, all but
+/// a share of its sequences fit at least as well.
 fn least_fits(each: &[Played], objects: usize) -> Vec<i16> {
-    let least = |object: usize| {
+    let least_fit = |object: usize| {
         let lowest =
             |played: &Played| played.fits.iter().filter(|(leader, _)| *leader == object).map(|(_, fit)| *fit).min();
         let mut all: Vec<i32> = each.iter().filter(|played| played.class == object).filter_map(lowest).collect();
         all.sort_unstable();
-        let alarms = ((all.len() + 1) as f64 * ALARMS) as usize;
-        // 0 is no test.
+        let alarms = ((all.len() + 1) as f64 * ALARM_RATE) as usize;
+        // 0 stands for no test.
         all.get(alarms).map_or(0, |&fit| i16::try_from(fit).unwrap_or(i16::MIN).min(-1))
     };
-    (0..objects).map(least).collect()
+    (0..objects).map(least_fit).collect()
 }
 
 /// Distance of a pose in another placement from the truth, in units of its intervals.

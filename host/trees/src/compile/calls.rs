@@ -1,5 +1,5 @@
-//! Functions in C that a program calls: a row to its class, value or probabilities, and steps to a verdict, from a model that
-//! is a constant.
+//! Writes C functions for a model that is a constant: from a row to its class, value or probabilities, and from steps to a
+//! verdict.
 
 use super::container::parts;
 use super::cost::has_sequences;
@@ -11,14 +11,14 @@ use palpate_shared::Descriptor;
 use palpate_shared::format::{Axis, CHECKSUM_LENGTH, Key, Link, RowEvidence, Tag};
 use std::fmt::Write as _;
 
-/// A model as C calls it.
+/// A model that C functions are written for.
 pub(super) struct Calls<'a> {
     pub(super) model: &'a Model<'a>,
     pub(super) legend: &'a Legend<'a>,
     /// Prefix of all names.
     pub(super) name: &'a str,
     pub(super) probability: Probability,
-    /// True if its trees are code.
+    /// True if the trees are code.
     pub(super) is_code: bool,
 }
 
@@ -27,10 +27,10 @@ impl Calls<'_> {
     pub(super) fn text(&self) -> String {
         let mut text = self.opened() + &self.legend.c(self.name);
         if self.model.descriptor().is_none() {
-            text += &self.of_rows();
+            text += &self.row_functions();
         }
         if self.model.object_count() > 1 && !self.model.prediction().targets {
-            text += &self.of_steps();
+            text += &self.step_functions();
         }
         let name = self.name;
         text + &format!(
@@ -45,13 +45,13 @@ impl Calls<'_> {
         let bytes = model.bytes();
         let parts = parts(model);
         let checksum = &bytes[bytes.len() - CHECKSUM_LENGTH..];
-        let at = |part: &[u8]| format!("{name}_model + {}", part.as_ptr().addr() - bytes.as_ptr().addr());
-        let pointer = |part: Option<&[u8]>| part.map_or_else(|| "NULL".into(), at);
+        let pointer_to = |part: &[u8]| format!("{name}_model + {}", part.as_ptr().addr() - bytes.as_ptr().addr());
+        let pointer = |part: Option<&[u8]>| part.map_or_else(|| "NULL".into(), pointer_to);
         let section = |tag: Tag| {
             pointer(model.optional_sections().find(|section| section.tag == tag.code()).map(|section| section.content))
         };
         let trained = model.trained_touches();
-        let most = |row: RowEvidence<'_>| ((row.len() as u32 - 1) << row.shifts.between) - 1;
+        let last_point = |row: RowEvidence<'_>| ((row.len() as u32 - 1) << row.shifts.between) - 1;
         let code = if self.is_code { format!("{name}_code_") } else { "NULL".into() };
         format!(
             "/* The model as palpate_open leaves it: its bytes were checked when it was exported. */\n\
@@ -61,8 +61,8 @@ impl Calls<'_> {
              #if PALPATE_OUTPUTS\n    {outputs},\n#endif\n    \
              0, {spread}u, {objects}, {known}, {features}, {layout}, {leaf}, {descriptor}, {real}, {patterns}, {oriented}\n\
              #if PALPATE_LAYOUTS & PALPATE_CODE\n    , {code}\n#endif\n}};\n\n",
-            parts = parts.into_iter().chain([checksum]).map(at).collect::<Vec<_>>().join(", "),
-            cuts = at(&parts[3][Axis::LENGTH * usize::from(header.axes())..]),
+            parts = parts.into_iter().chain([checksum]).map(pointer_to).collect::<Vec<_>>().join(", "),
+            cuts = pointer_to(&parts[3][Axis::LENGTH * usize::from(header.axes())..]),
             odds = section(Tag::ThresholdsByObject),
             strangers = section(Tag::Strangers),
             table = pointer(model.shared_leaves().map(|shared| shared.values())),
@@ -70,7 +70,7 @@ impl Calls<'_> {
             weights = section(Tag::Weights),
             rows = section(Tag::RowEvidence),
             start = model.row_evidence().map_or(0, |row| row.start),
-            most = model.row_evidence().map_or(0, most),
+            most = model.row_evidence().map_or(0, last_point),
             position = section(Tag::Position),
             guard = section(Tag::Guard),
             outputs = section(Tag::Outputs),
@@ -92,7 +92,7 @@ impl Calls<'_> {
         self.model.descriptor().is_some_and(Descriptor::needs_pose)
     }
 
-    /// Type of a row's features, and what stands for a missing one.
+    /// The C type of a row's features, and the value of a missing one.
     fn row(&self) -> (&'static str, &'static str) {
         if self.model.key() == Key::Real { ("float", "NaN") } else { ("int32_t", "INT32_MIN") }
     }
@@ -116,7 +116,8 @@ impl Calls<'_> {
         format!("    uint32_t sums[{objects}];\n{lines}    palpate_sum_(&{name}_opened_, {keys}, {features}, sums);\n")
     }
 
-    fn of_rows(&self) -> String {
+    /// Functions that predict from a row.
+    fn row_functions(&self) -> String {
         let (name, objects, features) = (self.name, self.model.object_count(), self.model.feature_count());
         let (row, missing) = self.row();
         let mut text = String::new();
@@ -139,11 +140,11 @@ impl Calls<'_> {
                 1 => ("The value".to_owned(), "float", "value", ""),
                 _ => (format!("The {objects} values"), "void", "values", ", float *values"),
             };
-            let body = |of: &str| match objects {
-                1 => format!("    float value;\n{sums}    {of}(&{name}_opened_, sums, &value);\n    return value;\n"),
-                _ => format!("{sums}    {of}(&{name}_opened_, sums, values);\n"),
+            let body = |call: &str| match objects {
+                1 => format!("    float value;\n{sums}    {call}(&{name}_opened_, sums, &value);\n    return value;\n"),
+                _ => format!("{sums}    {call}(&{name}_opened_, sums, values);\n"),
             };
-            let (bounds, offsets) = self.of_values();
+            let (bounds, offsets) = self.accuracy();
             call(&about, &bounds, kind, function, parameter, &body("palpate_values_of_"));
             if let Some(offsets) = offsets {
                 let function = format!("{function}_without_offset");
@@ -179,15 +180,15 @@ impl Calls<'_> {
         text
     }
 
-    /// A sentence on how close values are to the library's, and the offsets that they are without in another function, if there
-    /// are such and a value is a margin.
-    fn of_values(&self) -> (String, Option<String>) {
+    /// A sentence on how close values are to the library's; and the offsets that another function leaves out, if values are margins
+    /// with offsets.
+    fn accuracy(&self) -> (String, Option<String>) {
         let prediction = self.model.prediction();
         let outputs = 0..self.model.object_count();
         let bounds = outputs.clone().map(|output| format!("{:.1e}", bound_of(self.model, output)));
         let bounds = format!(" Margins are within {} of the library's", bounds.collect::<Vec<_>>().join(", "));
         let offsets: Vec<f32> =
-            outputs.filter_map(|output| self.model.output_scale(output).map(|own| own.offset)).collect();
+            outputs.filter_map(|output| self.model.output_scale(output).map(|scale| scale.offset)).collect();
         if offsets.is_empty() || prediction.link != Link::Identity || prediction.average != 1 {
             return (bounds + ".", None);
         }
@@ -197,7 +198,7 @@ impl Calls<'_> {
         (format!("{bounds}; an f32 steps by {}.", steps.join(", ")), Some(list.join(", ")))
     }
 
-    /// The farthest that a probability can be from the library's.
+    /// Largest difference of a probability from the library's.
     fn bound(&self) -> f32 {
         // A softmax changes by half as much as its margins at most.
         let margin = self.model.margin_error();
@@ -209,10 +210,10 @@ impl Calls<'_> {
     }
 
     /// Functions that add up rows of a stream, or steps of a model that computes its features.
-    fn of_steps(&self) -> String {
+    fn step_functions(&self) -> String {
         let (name, objects, features) = (self.name, self.model.object_count(), self.model.feature_count());
         if has_sequences(self.model) {
-            return self.of_sequences();
+            return self.sequence_functions();
         }
         let (step, parameter, body) = if self.model.descriptor().is_none() {
             let body = if self.is_code {
@@ -245,7 +246,7 @@ impl Calls<'_> {
     }
 
     /// Functions of a model that numbers the rows of a sequence, or states which of them it takes.
-    fn of_sequences(&self) -> String {
+    fn sequence_functions(&self) -> String {
         let (name, features) = (self.name, self.model.feature_count());
         let (row, missing) = self.row();
         let place = self.model.position().map(|position| usize::from(position.feature));
