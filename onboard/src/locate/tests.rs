@@ -251,6 +251,21 @@ fn a_wedge_and_a_cylinder_are_told_apart_with_place_and_yaw() {
 }
 
 #[test]
+fn a_window_that_reaches_into_the_map_from_beside_it_holds_the_object() {
+    let slab: Heights = |x, y| if x.abs() <= 10.0 && y.abs() <= 10.0 { 24.0 } else { 0.0 };
+    let bytes = model(&[Placed(0, slab, [11, 11], false)], 0);
+    let maps = Maps::new(&bytes).unwrap();
+    let placement = maps.placement(0);
+    // Cells end at 11 mm; windows of 3.75 mm are those of two cells to each side.
+    for (x, high) in [(0, 24), (10, 24), (11, 24), (12, 24), (14, 0), (40, 0)] {
+        for [x, y] in [[x, 0], [-x, 0], [0, x], [0, -x]] {
+            let [_, highest] = maps.heights(&placement, 16 * x, 16 * y, 60);
+            assert_eq!(highest, 16 * high, "{x}, {y}");
+        }
+    }
+}
+
+#[test]
 fn an_object_that_looks_the_same_from_behind_has_two_poses() {
     let bytes = model(&[BAR, CYLINDER], 0);
     let mut locator = locator(&bytes);
