@@ -385,7 +385,7 @@ fn promised(
 }
 
 /// The strictest margin that is tried, in nats: more than the promise's own, unless searches are not as fine. They end when cells
-/// that are not fine weigh e^-6 of all.
+/// that are not fine weigh e^-6 of all, or less where an object leads.
 fn strictest(terms: &Terms) -> f64 {
     let own = terms.promise.margin();
     own.max((own + 4.0).min(6.0))
