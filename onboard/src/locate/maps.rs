@@ -445,22 +445,25 @@ impl<'a> Maps<'a> {
     #[inline(always)]
     fn nearby(&self, placement: &Placement, x: i32, y: i32, level: usize) -> [u32; 2] {
         let [half, ..] = placement.half;
-        let offset = at(&placement.offset, 0);
-        let height = |i: i32, j: i32| self.count(offset.wrapping_add(row(half, i, j)));
         let mut range = [u32::MAX, 0];
-        let mut take = |height: u32| range = [range[0].min(height), range[1].max(height)];
         if self.is_fine || level == 1 {
             let (i, j) = self.cell_of(half, x, y);
             // Two cells away where cells are fine, one where they are coarse.
             let step = if self.is_fine { 1 << level } else { 1 };
-            if i < step || j < step || i > 2 * half[0] - step || j > 2 * half[1] - step {
+            let holds = |i: i32, j: i32, by: i32| i >= by && j >= by && i <= 2 * half[0] - by && j <= 2 * half[1] - by;
+            if !holds(i, j, -step) {
                 return [0; 2];
             }
-            [(0, 0), (0, -step), (-step, 0), (step, 0), (0, step)]
-                .into_iter()
-                .for_each(|(u, v)| take(height(i + u, j + v)));
+            let (is_inside, offset) = (holds(i, j, step), at(&placement.offset, 0));
+            let mut take = |(u, v): (i32, i32)| {
+                // Beside the grid there is the table.
+                let is_met = is_inside || holds(i + u, j + v, 0);
+                let height = if is_met { self.count(offset.wrapping_add(row(half, i + u, j + v))) } else { 0 };
+                range = [range[0].min(height), range[1].max(height)];
+            };
+            [(0, 0), (0, -step), (-step, 0), (step, 0), (0, step)].into_iter().for_each(&mut take);
             if step == 2 {
-                [(-1, -1), (1, -1), (-1, 1), (1, 1)].into_iter().for_each(|(u, v)| take(height(i + u, j + v)));
+                [(-1, -1), (1, -1), (-1, 1), (1, 1)].into_iter().for_each(take);
             }
         } else {
             let shift = self.shift();
