@@ -56,7 +56,7 @@ pub fn compile(ensemble: &Ensemble, settings: &Settings) -> Result<Compiled> {
 /// # Errors
 /// Errors of [`compile`].
 pub fn exact(ensemble: &Ensemble) -> Result<CompiledModel> {
-    Ok(CompiledModel::from_bytes(compile(ensemble, &with!(Settings::default(), leaf = Leaf::F32))?.bytes)?)
+    CompiledModel::from_bytes(compile(ensemble, &with!(Settings::default(), leaf = Leaf::F32))?.bytes)
 }
 
 /// Reads a model, or an ensemble as its [`exact`] model; the first bytes of the file say which it is.
@@ -67,10 +67,10 @@ pub fn read_any(path: impl AsRef<Path>) -> Result<CompiledModel> {
     let path = path.as_ref();
     let bytes = std::fs::read(path).map_err(|source| Error::io(path, "read the model", source))?;
     if bytes.starts_with(&MAGIC) {
-        return Ok(CompiledModel::from_file(path, bytes)?);
+        return CompiledModel::from_file(path, bytes);
     }
     let model = exact(&ensemble::read(path, &bytes, &Options::default())?).map_err(|error| error.in_file(path))?;
-    Ok(CompiledModel::from_file(path, model.into_bytes())?)
+    CompiledModel::from_file(path, model.into_bytes())
 }
 
 /// Compiles an ensemble to at most `most` bytes, as [`compile`].
