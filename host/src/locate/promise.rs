@@ -388,7 +388,7 @@ fn promised(
 }
 
 /// The strictest margin that is tried, in nats: 4 more than the promise's, but at most 6 unless the promise needs more, since a search
-/// ends when coarse cells weigh e^-6 of all, or less where an object leads.
+/// ends when coarse cells weigh e^-6 of all.
 fn strictest(terms: &Terms) -> f64 {
     let margin = terms.promise.margin();
     margin.max((margin + 4.0).min(6.0))

@@ -15,15 +15,10 @@ const ROUND_PARTS: i32 = 89;
 const OF_YAWS: i32 = 133;
 /// Cells less likely than the best by this are dropped, and count.
 const CUT: i32 = 30 * NAT;
+/// Cells within this of all together are split.
+const SPLIT: i32 = 12 * NAT;
 /// Search ends when cells that are not fine weigh less than all by this.
 const DONE: i32 = 6 * NAT;
-/// Cells are split that weigh less than all by as much more, at most.
-const FEW: i32 = 6 * NAT;
-/// A leader with nineteen of twenty parts of all may soon be named: the logarithm of that.
-const LEAD: i32 = -3;
-/// A coarse cell may weigh less than what is in it by as much for each touch: about a finger on the table its window has heights of an
-/// object too, which makes the table less likely there.
-const SHORT: i32 = NAT / 2;
 /// Share that a pool may lose at once when it is full.
 const LOSS: i32 = 9 * NAT;
 
@@ -42,7 +37,7 @@ impl Maps<'_> {
     /// Likelihood of a cell given the touches, the last first, and given in each interval the height that fits best, beginning with
     /// these; less than `least` may be of some of them alone.
     #[inline(always)]
-    pub(super) fn likely(
+    fn likely(
         &self,
         cell: &Cell,
         placement: &Placement,
@@ -308,7 +303,7 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize, P: Pool> Lo
                 self.put(Cell { placement, yaw, x, y, level: 0, likely: 0 }, &map);
             }
         }
-        let (mut done, mut is_deep) = (DONE, false);
+        let mut total;
         let mut threshold = self.highest() - NAT / 2;
         loop {
             let mut index = 0;
@@ -332,25 +327,14 @@ impl<const CELLS: usize, const TOUCHES: usize, const OBJECTS: usize, P: Pool> Lo
                 }
                 self.split(index, &cell);
             }
-            let (total, coarse) = self.weigh();
+            let coarse;
+            (total, coarse) = self.weigh();
             threshold -= NAT / 2;
-            let is_done = coarse < total - done || threshold < total - done - FEW;
-            if self.exhausted.is_none() && !is_done {
-                continue;
-            }
-            self.sum_up();
-            if self.exhausted.is_some() || is_deep || !self.has_lead() {
+            if self.exhausted.is_some() || coarse < total - DONE || threshold < total - SPLIT {
                 break;
             }
-            // What little is left may be much of what the others have.
-            (done, is_deep) = (DONE + SHORT * i32::try_from(self.touches).unwrap_or(0), true);
         }
-    }
-
-    /// True if the leader may soon be named.
-    fn has_lead(&self) -> bool {
-        // Logarithms of shares of all.
-        at(&self.posteriors, self.leader()) >= LEAD
+        self.sum_up();
     }
 
     /// Replaces a cell by its parts.
