@@ -10,7 +10,9 @@ fuzz_target!(|bytes: &[u8]| {
     let directory = Path::new("data");
     match Listing::parse(bytes, &Listing::path(directory)) {
         Ok(listing) => {
-            for (entry, pool) in listing.objects.iter().flat_map(|entry| entry.pools.iter().map(move |pool| (entry, pool))) {
+            for (entry, pool) in
+                listing.objects.iter().flat_map(|entry| entry.pools.iter().map(move |pool| (entry, pool)))
+            {
                 let file = entry.path(directory, pool);
                 let above = if pool.file.is_some() { directory.join(&entry.name) } else { directory.into() };
                 assert_eq!(file.parent(), Some(above.as_path()), "{}", file.display());

@@ -11,9 +11,9 @@
 //!
 //! All of them become an [`Ensemble`] over rows of f32 features, with the features' names and the classes' where the file
 //! has them. Comparisons are exact: `x <= t` is `x < c` with the next f32 c, for a t of any precision; the file's own t stays
-//! in [`Imported::thresholds`](super::Imported::thresholds), for rows of whole numbers that f32 does not hold. How far
+//! in `Imported::thresholds`, for rows of whole numbers that f32 does not hold. How far
 //! margins can be from the library's own is computed from the leaves and stated in
-//! [`Imported::rounding`](super::Imported::rounding). Splits by sets of categories become splits by thresholds. What cannot be
+//! `Imported::rounding`. Splits by sets of categories become splits by thresholds. What cannot be
 //! taken over exactly is rejected by name, such as linear leaves and statistics of the target.
 
 mod catboost;
