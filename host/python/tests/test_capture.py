@@ -117,8 +117,8 @@ def test_a_table_comes_back_as_the_same_touches_also_through_parquet(tmp_path: P
         plain = table.astype({"object": str}).convert_dtypes()
         same(palpate.DataSet.from_pandas(plain), data)
     assert {"instance", "robot", "position_z", "alignment_x"} <= set(table.columns)
-    # To the microsecond, in the order of the rows within an object.
-    order = np.argsort(np.array(names)[objects], kind="stable")
+    # To the microsecond, in the order of the rows within an object, instance and robot.
+    order = np.lexsort((robots, instances, np.array(names)[objects]))
     expected = np.round(1e6 * (times - np.fmin.reduce(times, axis=1)[:, None]))
     np.testing.assert_array_equal(np.round(1e6 * data.times), expected[order])
     probe = palpate.Probe(spacing=1.25)
