@@ -35,6 +35,7 @@ impl TouchOrigin {
     const PLACEMENTS: &str = "palpate_placements";
 
     /// Statements of touches about themselves, and the probe that they were made with.
+    #[cfg(feature = "train")]
     pub(crate) fn new(dataset: &Dataset, probe: Option<StatedProbe>) -> Self {
         Self { probe, touches: fingerprints(dataset), ..Self::default() }
     }
@@ -88,6 +89,7 @@ impl TouchOrigin {
     }
 
     /// Provenance of an ensemble that states this and nothing else.
+    #[cfg(feature = "train")]
     pub(crate) fn origin(&self) -> Provenance {
         let mut origin = Provenance::default();
         self.state(&mut origin);

@@ -27,6 +27,7 @@ impl<'m> Sums<'m> {
     }
 
     /// The sums, in the model's units.
+    #[cfg(feature = "train")]
     pub(crate) fn evidence(&self) -> &[i64] {
         &self.evidence
     }
