@@ -358,11 +358,9 @@ pub(crate) fn sources(object: &Object, scenes: &[Scene]) -> Vec<Source> {
 
 fn sources_of(instances: &[String], scenes: &[Scene]) -> Vec<Source> {
     let placement = |scene: &Scene| {
-        scene.table().map(|table| {
-            let (instance, placement) = (instances.get(table.instance).cloned(), table.placement.clone());
-            let millionths = (table.weight * 1e6).round().clamp(0.0, 1e6) as u32;
-            Source::Placement { instance, placement, millionths }
-        })
+        scene
+            .table()
+            .map(|table| Source::placed(instances.get(table.instance).cloned(), table.placement.clone(), table.weight))
     };
     let placements: Vec<Source> = scenes.iter().filter_map(placement).collect();
     if placements.is_empty() { instances.iter().cloned().map(Source::Instance).collect() } else { placements }

@@ -94,10 +94,7 @@ impl PoolFile {
     pub(crate) fn source(&self, number: usize) -> Source {
         match (&self.recorded, &self.placement, &self.instance) {
             (Some(recorded), ..) => Source::Recording(Recorded { number, ..recorded.clone() }),
-            (_, Some(Lying { name, weight }), instance) => {
-                let millionths = (weight * 1e6).round().clamp(0.0, 1e6) as u32;
-                Source::Placement { instance: instance.clone(), placement: name.clone(), millionths }
-            }
+            (_, Some(Lying { name, weight }), instance) => Source::placed(instance.clone(), name.clone(), *weight),
             (.., Some(instance)) => Source::Instance(instance.clone()),
             _ => Source::Object,
         }

@@ -40,6 +40,11 @@ impl Source {
             Self::Object | Self::Instance(_) | Self::Log(_) => None,
         }
     }
+
+    /// A placement of an object, or of one of its instances, with a weight from 0 to 1.
+    pub(crate) fn placed(instance: Option<String>, placement: String, weight: f64) -> Self {
+        Self::Placement { instance, placement, millionths: (weight * 1e6).round().clamp(0.0, 1e6) as u32 }
+    }
 }
 
 impl From<String> for Source {
@@ -307,18 +312,6 @@ impl ObjectTouches {
             let count = (all * weight(pool)).round() as usize;
             touches.iter().copied().take(count.max(1)).collect()
         })
-    }
-
-    /// These touches, each made by the robot with this number.
-    #[must_use]
-    pub fn of_robots(&self, robots: &[u32]) -> Self {
-        let robot = |position: usize| Some(robots.get(position).copied().unwrap_or(0));
-        let of = |pool: &'_ Pool| {
-            let source = pool.source.clone();
-            let touches = pool.range.clone().zip(self.of_pool(pool));
-            touches.map(move |(position, touch)| (source.clone(), robot(position), vec![*touch])).collect::<Vec<_>>()
-        };
-        Self::of_parts(&self.name, self.pools.iter().flat_map(of)).of_stroke(self.window)
     }
 
     /// True if every sequence must be of one robot's touches, since robots differ.

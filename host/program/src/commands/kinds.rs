@@ -33,16 +33,22 @@ impl ModelKind {
 
 /// Reads a compiled model for a command that takes models of trees of one kind.
 pub(super) fn compiled(path: &Path, wanted: ModelKind, command: &str) -> Result<CompiledModel> {
-    refuse_maps(path, wanted, command)?;
-    let compiled = CompiledModel::read(path)?;
-    check(path, of_trees(compiled.model().descriptor().is_some()), wanted, command)?;
-    Ok(compiled)
+    trees(path, || CompiledModel::read(path), wanted, command)
 }
 
 /// Reads a compiled model, or an ensemble as its exact model, for a command that takes those of one kind.
 pub(super) fn file(path: &Path, wanted: ModelKind, command: &str) -> Result<CompiledModel> {
+    trees(path, || compile::read_any(path), wanted, command)
+}
+
+fn trees(
+    path: &Path,
+    read: impl FnOnce() -> Result<CompiledModel>,
+    wanted: ModelKind,
+    command: &str,
+) -> Result<CompiledModel> {
     refuse_maps(path, wanted, command)?;
-    let compiled = compile::read_any(path)?;
+    let compiled = read()?;
     check(path, of_trees(compiled.model().descriptor().is_some()), wanted, command)?;
     Ok(compiled)
 }

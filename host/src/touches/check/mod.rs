@@ -103,10 +103,14 @@ impl Findings {
             let what = format!("a log, which is not read beside {}", Listing::FILE);
             self.note(&path, &what, "Record its touches with `palpate data record`, or move it away.");
         }
-        for (name, path) in super::files(directory)? {
-            if listing.paths(directory).all(|listed| listed != path) {
-                let what = format!("the object {name} is not listed in {}, so it is not read", Listing::FILE);
-                self.note(&path, &what, "Capture all objects together, or remove the file.");
+        // Objects with several files have a directory.
+        let inner = listing.objects.iter().map(|entry| directory.join(&entry.name)).filter(|path| path.is_dir());
+        for directory_of_files in std::iter::once(directory.to_owned()).chain(inner) {
+            for (_, path) in super::files(&directory_of_files)? {
+                if listing.paths(directory).all(|listed| listed != path) {
+                    let what = format!("not listed in {}, so it is not read", Listing::FILE);
+                    self.note(&path, &what, "Capture all objects together, or remove the file.");
+                }
             }
         }
         Ok(())

@@ -94,7 +94,10 @@ fn what_a_listing_states_must_be_there() {
     let (wrong_ones, notes) = said(directory.path());
     assert_eq!(wrong_ones, [""; 0]);
     assert!(notes[0].contains("fork.txt: changed since its capture"), "{notes:?}");
-    assert!(notes[1].contains("cup.txt: the object cup is not listed"), "{notes:?}");
+    assert!(notes[1].contains("cup.txt: not listed in dataset.json, so it is not read"), "{notes:?}");
+    std::fs::create_dir(directory.path().join("fork")).unwrap();
+    std::fs::write(directory.path().join("fork/2.txt"), lines(&touches(5))).unwrap();
+    assert!(said(directory.path()).1.iter().any(|note| note.contains("2.txt: not listed")), "files of an object, too");
     std::fs::write(Listing::path(directory.path()), "{").unwrap();
     wrong(directory.path(), "dataset.json:1: not the listing of a data set");
 }

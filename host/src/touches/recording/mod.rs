@@ -88,12 +88,6 @@ impl Recording {
                     .fix("Wait until it is done, or give another directory."),
             )
         };
-        let unlisted = |files: &str| {
-            here(
-                problem!("holds {files}, which dataset.json does not list")
-                    .fix("Give another directory, or move the files away."),
-            )
-        };
         let lock = output::lock(directory)?.ok_or_else(busy)?;
         output::remove_leftovers(directory)?;
         let listing = match Listing::read(directory)? {
@@ -102,12 +96,15 @@ impl Recording {
                 let names = |(_, path): &(_, PathBuf)| path.file_name().map(|name| name.display().to_string());
                 let files: Vec<String> = files(directory)?.iter().filter_map(names).collect();
                 if !files.is_empty() {
-                    return Err(unlisted(&files.join(", ")));
+                    return Err(unlisted(&files.join(", "), directory));
                 }
                 let usual = || Origin::recorded(super::Origin::default().probe, Length::Tenth, false);
                 Listing::new(&origin.cloned().unwrap_or_else(usual), [])
             }
         };
+        // Before the first touch, which would be lost.
+        let first = Entry { name: object.into(), ..Entry::default() };
+        next_file(directory, listing.objects.iter().find(|entry| entry.name == object).unwrap_or(&first))?;
         let recorded = Recorded {
             placement: placement.map(str::to_owned),
             began: humantime::format_rfc3339_seconds(began).to_string(),
@@ -295,15 +292,32 @@ impl Open {
         });
         let entry = &mut objects[number];
         let place = [number, entry.pools.len()];
-        let number = |pool: &PoolFile| pool.file.as_ref().map_or(1, |file| file.parse::<u64>().unwrap_or(0));
-        let file = entry.pools.iter().map(number).max().map(|last| (last + 1).to_string());
-        let pool = PoolFile { file, recorded: Some(recorded.clone()), ..PoolFile::default() };
-        let path = entry.path(directory, &pool);
-        entry.pools.push(pool);
+        let (pool, path) = next_file(directory, entry)?;
+        entry.pools.push(PoolFile { recorded: Some(recorded.clone()), ..pool });
         listing.write(directory)?;
         let file = make(&path).map_err(|error| Error::io(&path, "write the touches", error))?;
         Ok(Self { path, place, file, digest: CRC.digest() })
     }
+}
+
+/// The file of the next recording of an object, and its path, at which there must be nothing: what is there would be taken for its
+/// touches.
+fn next_file(directory: &Path, entry: &Entry) -> Result<(PoolFile, PathBuf)> {
+    let number = |pool: &PoolFile| pool.file.as_ref().map_or(1, |file| file.parse::<u64>().unwrap_or(0));
+    let file = entry.pools.iter().map(number).max().map(|last| (last + 1).to_string());
+    let pool = PoolFile { file, ..PoolFile::default() };
+    let path = entry.path(directory, &pool);
+    match path.exists() {
+        true => Err(unlisted(&path.strip_prefix(directory).unwrap_or(&path).display().to_string(), directory)),
+        false => Ok((pool, path)),
+    }
+}
+
+/// The problem of files that a listing does not name.
+fn unlisted(files: &str, directory: &Path) -> Error {
+    problem!("holds {files}, which dataset.json does not list")
+        .fix("Give another directory, or move the files away.")
+        .at(Place::file(directory))
 }
 
 /// A recorded listing to add to.

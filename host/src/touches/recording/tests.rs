@@ -245,6 +245,26 @@ fn a_directory_with_simulated_or_unlisted_touches_or_another_recorder_is_refused
 }
 
 #[test]
+fn a_file_where_the_next_recording_would_be_is_refused_and_never_listed() {
+    let directory = tempfile::tempdir().unwrap();
+    whole(directory.path(), "fork", 0..2);
+    let listed = fs::read(Listing::path(directory.path())).unwrap();
+    fs::create_dir(directory.path().join("fork")).unwrap();
+    for (object, file) in [("spoon", "spoon.txt"), ("fork", "fork/2.txt")] {
+        let path = directory.path().join(file);
+        fs::write(&path, "0 0 0\n").unwrap();
+        says(open(directory.path(), object), &format!("holds {file}, which dataset.json does not list"));
+        fs::remove_file(&path).unwrap();
+        // One that appears after the recording was opened.
+        let mut recording = open(directory.path(), object).unwrap();
+        fs::write(&path, "0 0 0\n").unwrap();
+        says(recording.add(&touch(7)), &format!("holds {file}, which dataset.json does not list"));
+    }
+    assert_eq!(fs::read(Listing::path(directory.path())).unwrap(), listed);
+    assert_eq!(all(&read(directory.path()), 0), touches(0..2));
+}
+
+#[test]
 fn the_touches_of_a_file_are_added_once() {
     let directory = tempfile::tempdir().unwrap();
     let add = |object: &str, numbers| open(directory.path(), object).unwrap().add_all(&touches(numbers));
